@@ -1,0 +1,1 @@
+"""Plane geometry: polygons and the separation of their features."""
