@@ -1,0 +1,1 @@
+"""Elemental contacts, their gaps and derivatives, and contact detection."""

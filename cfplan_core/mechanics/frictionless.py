@@ -1,0 +1,147 @@
+"""The frictionless quasi-static model: contacts push along their normals, gravity loads.
+
+Equilibrium: W c + f = 0, c ≥ 0; actuator torques τ = −Jᵀ c. Trinkle & Hunter (1991), Section 3;
+the inequalities are those of Trinkle's quasi-static model of sliding contacts. The small linear
+programs are solved by enumerating bases, all configurations at once.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import combinations
+
+import numpy as np
+
+from cfplan_core.contact.system import IntArray
+from cfplan_core.errors import JammedError
+from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.closure import span_margin
+from cfplan_core.mechanics.contact_model import Margins, Motion
+
+_SINGULAR = 1e-12
+_NEGATIVE = 1e-9
+
+
+@lru_cache(maxsize=128)
+def _subsets(count: int, size: int) -> IntArray:
+    return np.array(list(combinations(range(count), size)), dtype=np.intp).reshape(-1, size)
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.stack(
+        [
+            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
+            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
+            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
+        ],
+        axis=-1,
+    )
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray((a * b).sum(axis=-1))
+
+
+class FrictionlessModel:
+    """Frictionless contacts of rigid bodies, slow motion.
+
+    Attributes:
+        load: Shape (3,), gravity's wrench on the object, without units; zero if there is none.
+    """
+
+    reversible = True
+
+    def __init__(self, load: FloatArray) -> None:
+        """Create the model for one direction of gravity (see `ContactSystem.load`)."""
+        self.load = load
+
+    def margins(self, gradients: FloatArray) -> Margins:
+        """Judge stability: the columns of W and f, or of W alone, positively span R³."""
+        wrenches = gradients[..., :3]
+        form_closure = span_margin(wrenches)
+        if not self.load.any():
+            return Margins(form_closure, form_closure)
+        load = np.broadcast_to(self.load, (len(wrenches), 1, 3))
+        return Margins(span_margin(np.concatenate([wrenches, load], axis=1)), form_closure)
+
+    def torque_limits(self, gradients: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Minimum and maximum of τ_j over {c ≥ 0, W c = −f}, over its vertices and rays."""
+        w, j = gradients[..., :3], gradients[..., 3:]
+        count = w.shape[1]
+        triples = _subsets(count, 3)
+        a, b, c = (w[:, triples[:, i]] for i in range(3))
+        bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)
+        determinant = _dot(a, bc)
+        regular = np.abs(determinant) > _SINGULAR
+        safe = np.where(regular, determinant, 1.0)
+        forces = -np.stack([bc @ self.load, ca @ self.load, ab @ self.load], axis=-1)
+        forces = forces / safe[..., None]
+        scale = 1.0 + np.abs(forces).max(axis=-1)
+        feasible = regular & (forces.min(axis=-1) >= -_NEGATIVE * scale)
+        torques = -np.einsum('stc,stcn->stn', forces, j[:, triples])
+        lower = np.where(feasible[..., None], torques, np.inf).min(axis=1, initial=np.inf)
+        upper = np.where(feasible[..., None], torques, -np.inf).max(axis=1, initial=-np.inf)
+        self._open_unbounded(w, j, lower, upper)
+        impossible = ~feasible.any(axis=1)
+        lower[impossible] = upper[impossible] = np.nan
+        return lower, upper
+
+    @staticmethod
+    def _open_unbounded(
+        w: FloatArray, j: FloatArray, lower: FloatArray, upper: FloatArray
+    ) -> None:
+        """Replace limits by infinity along the rays of {c ≥ 0, W c = 0}."""
+        quadruples = _subsets(w.shape[1], 4)
+        if not len(quadruples):
+            return
+        a, b, c, d = (w[:, quadruples[:, i]] for i in range(4))
+        bc, cd = _cross(b, c), _cross(c, d)
+        ad = _cross(a, d)
+        internal = np.stack([_dot(b, cd), -_dot(a, cd), -_dot(ad, b), -_dot(a, bc)], axis=-1)
+        size = np.abs(internal).max(axis=-1, keepdims=True)
+        internal = internal / np.maximum(size, _SINGULAR)
+        internal = internal * np.where(internal.sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+        ray = (size[..., 0] > _SINGULAR) & (internal.min(axis=-1) >= -_NEGATIVE)
+        torques = -np.einsum('stc,stcn->stn', internal, j[:, quadruples])
+        upper[(ray[..., None] & (torques > _NEGATIVE)).any(axis=1)] = np.inf
+        lower[(ray[..., None] & (torques < -_NEGATIVE)).any(axis=1)] = -np.inf
+
+    def motion(self, gradients: FloatArray, joint_velocity: FloatArray) -> Motion:
+        """Minimise −fᵀ q̇ subject to Wᵀ q̇ + J θ̇ ≥ 0 over the vertices of the feasible set.
+
+        Raises:
+            JammedError: The set is empty, or the contacts do not restrain the object enough for it
+                to have a vertex.
+        """
+        w, drive = gradients[:, :3], gradients[:, 3:] @ joint_velocity
+        triples = _subsets(len(w), 3)
+        a, b, c = (w[triples[:, i]] for i in range(3))
+        bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)
+        determinant = _dot(a, bc)
+        regular = np.abs(determinant) > _SINGULAR
+        if not regular.any():
+            raise JammedError(
+                f'contacts of rank below 3 do not determine the motion ({len(w)} contacts)'
+            )
+        target = -drive[triples[regular]]
+        velocity = (
+            target[:, :1] * bc[regular] + target[:, 1:2] * ca[regular] + target[:, 2:] * ab[regular]
+        ) / determinant[regular, None]
+        rates = velocity @ w.T + drive
+        scale = 1.0 + np.abs(velocity).max(axis=1)
+        feasible = rates.min(axis=1) >= -_NEGATIVE * scale
+        if not feasible.any():
+            raise JammedError(
+                f'no object velocity keeps all {len(w)} gaps open at joint velocity '
+                f'{np.array2string(joint_velocity, precision=4)}: the grasp jams'
+            )
+        velocity, rates = velocity[feasible], rates[feasible]
+        fall = velocity @ self.load
+        best = int(np.argmax(fall))
+        ties = fall >= fall[best] - _NEGATIVE * (1.0 + abs(fall[best]))
+        spread = np.abs(velocity[ties] - velocity[best]).max()
+        return Motion(
+            velocity[best],
+            np.where(np.abs(rates[best]) < _NEGATIVE, 0.0, rates[best]),
+            bool(spread <= _NEGATIVE * (1.0 + np.abs(velocity[best]).max())),
+        )

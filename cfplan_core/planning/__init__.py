@@ -1,0 +1,1 @@
+"""Search: tracing contact formations, transitions between them, the two CF-trees."""

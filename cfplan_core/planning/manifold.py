@@ -1,0 +1,110 @@
+"""The constraint manifold of a contact formation: tangents and projection onto it.
+
+The manifold is {z : g_i(z) = 0 for all contacts i}. Points on it are found by Newton's method on
+the square system made of the gaps and of coordinates T (z − z_0) along a tangent basis T, for many
+coordinates at once: the steps along a whole stretch of a curve are solved for in one batch.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cfplan_core.contact.gaps import gap_gradients, gaps
+from cfplan_core.contact.system import ContactSystem, IntArray
+from cfplan_core.geometry.polygon import FloatArray
+
+# Gradients of gaps have rows of size one: below this a row counts as dependent on others.
+RANK_TOLERANCE = 1e-7
+_CONVERGED = 1e-9
+_ITERATIONS = 8
+
+
+class Projected(NamedTuple):
+    """Points found on a manifold.
+
+    Attributes:
+        points: Shape (s, 3 + n).
+        gradients: Shape (s, k, 3 + n), of the gaps of the rows asked for, at the points.
+        converged: Shape (s,), false where Newton's method found no point.
+    """
+
+    points: FloatArray
+    gradients: FloatArray
+    converged: FloatArray
+
+
+def independent_rows(gradients: FloatArray) -> tuple[int, ...]:
+    """Choose a largest independent set of rows, earlier rows first (Gram-Schmidt)."""
+    basis: list[FloatArray] = []
+    chosen = []
+    for index, row in enumerate(gradients):
+        rest = row - sum((row @ b) * b for b in basis)
+        norm = float(np.linalg.norm(rest))
+        if norm > RANK_TOLERANCE:
+            # A second pass keeps the basis orthogonal to working precision.
+            rest = rest / norm
+            rest = rest - sum((rest @ b) * b for b in basis)
+            basis.append(rest / np.linalg.norm(rest))
+            chosen.append(index)
+    return tuple(chosen)
+
+
+def tangent_basis(gradients: FloatArray) -> FloatArray:
+    """Orthonormal basis of the null space of independent rows.
+
+    Args:
+        gradients: Shape (k, m), rank k.
+
+    Returns:
+        Shape (m - k, m).
+    """
+    count = len(gradients)
+    return np.asarray(np.linalg.svd(gradients)[2][count:])
+
+
+def project(
+    system: ContactSystem,
+    rows: IntArray,
+    origin: FloatArray,
+    basis: FloatArray,
+    guesses: FloatArray,
+) -> Projected:
+    """Move guesses onto the manifold, keeping their coordinates along a tangent basis.
+
+    Args:
+        system: Compiled problem.
+        rows: Pairs whose gaps vanish, independent, shape (k,).
+        origin: Shape (3 + n,).
+        basis: Shape (3 + n - k, 3 + n), completes the gradients to full rank.
+        guesses: Shape (s, 3 + n).
+
+    Returns:
+        The points; those that did not converge are where the iteration stopped.
+    """
+    points = guesses.copy()
+    wanted = (guesses - origin) @ basis.T
+    count, k = len(points), len(rows)
+    matrix = np.empty((count, system.dof, system.dof))
+    matrix[:, k:] = basis
+    residual = np.empty((count, system.dof, 1))
+    change = np.full(count, np.inf)
+    with np.errstate(over='ignore', invalid='ignore'):
+        for _ in range(_ITERATIONS):
+            placed = system.place(points)
+            gradients = gap_gradients(system, placed, rows)
+            matrix[:, :k] = gradients
+            residual[:, :k, 0] = gaps(system, placed, rows).gap
+            residual[:, k:, 0] = (points - origin) @ basis.T - wanted
+            try:
+                step = np.linalg.solve(matrix, residual)[..., 0]
+            except np.linalg.LinAlgError:
+                break
+            change = np.abs(step).max(axis=1)
+            points -= step
+            if not (change > _CONVERGED).any():
+                break
+            if (change > 10.0).any():
+                points[~(change <= 10.0)] = origin
+    return Projected(points, gradients, change <= _CONVERGED)

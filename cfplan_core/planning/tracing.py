@@ -1,0 +1,408 @@
+"""Follow a contact formation along a curve to the event that ends it.
+
+The curve is the formation's manifold itself where that has dimension one, and a path steered in
+the manifold where it has more. It is followed in stretches: a whole stretch of steps along the
+tangent is projected onto the manifold by one batched Newton iteration, searched for events, and
+cut at the first. Events are located by Newton's method where their gradient is known (gaps, edge
+ends, joint limits) and by Brent's method otherwise (stability).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cfplan_core.contact.formation import Formation
+from cfplan_core.contact.gaps import gap_gradients, gaps, offset_gradients
+from cfplan_core.contact.system import ContactSystem, IntArray
+from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.contact_model import ContactModel, Margins, Stability
+from cfplan_core.planning.events import Candidate, EventKind, sight
+from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
+
+# Margins below this count as lost: nothing is planned that is held by less.
+STABILITY_MARGIN = 1e-6
+# Distance, in radians and object sizes, of successive points on a curve.
+STEP = 0.04
+_STRETCH = 10
+_SMALLEST_STEP = 1e-7
+_LOCATED = 1e-11
+
+# Chooses the direction of motion from a configuration and the tangent basis there: a unit vector
+# in the span of the basis, or None where there is nowhere left to go.
+Steering = Callable[[FloatArray, FloatArray], 'FloatArray | None']
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A followed curve.
+
+    Attributes:
+        points: Shape (s, 3 + n), from the start to the event, both included.
+        kind: What ended it.
+        pairs: The pairs that closed or reached their edge's end; a joint's index for a limit.
+        length: Largest coordinate change added up over the steps.
+    """
+
+    points: FloatArray
+    kind: EventKind
+    pairs: tuple[int, ...] = ()
+
+    @property
+    def end(self) -> FloatArray:
+        """Last configuration."""
+        return np.asarray(self.points[-1])
+
+
+def root(function: Callable[[float], float]) -> float:
+    """Root of a function that changes its sign between 0 and 1, by Brent's method."""
+    from scipy.optimize import brentq  # Costs half a second to import.
+
+    return float(brentq(function, 0.0, 1.0, xtol=1e-9))
+
+
+def classify(margins: Margins) -> Stability:
+    """Name the stability class of the first configuration of a batch."""
+    if not margins.stable[0] > STABILITY_MARGIN:
+        return Stability.UNSTABLE
+    if margins.form_closure[0] > STABILITY_MARGIN:
+        return Stability.FORM_CLOSURE
+    return Stability.FORCE_CLOSURE
+
+
+class Tracer:
+    """Follows curves of one system under one contact model."""
+
+    def __init__(self, system: ContactSystem, model: ContactModel) -> None:
+        self.system = system
+        self.model = model
+
+    def margins(self, formation: Formation, z: FloatArray) -> Margins:
+        """Stability margins of a formation at configurations of shape (s, 3 + n)."""
+        gradients = gap_gradients(self.system, self.system.place(z), formation.array)
+        return self.model.margins(gradients)
+
+    def follow(
+        self,
+        formation: Formation,
+        start: FloatArray,
+        steer: Steering,
+        departing: frozenset[int] = frozenset(),
+        longest: float = 100.0,
+    ) -> Trace:
+        """Follow a formation until an event.
+
+        Args:
+            formation: The contacts that are kept.
+            start: Configuration on its manifold, shape (3 + n,).
+            steer: Chooses the direction at the beginning of every stretch.
+            departing: Other pairs that touch at the start and open.
+            longest: Stop with `EventKind.LOST` after this length.
+        """
+        return _Pursuit(self, formation, start, steer, departing, longest).run()
+
+
+class _Pursuit:
+    """State of following one curve."""
+
+    def __init__(
+        self,
+        tracer: Tracer,
+        formation: Formation,
+        start: FloatArray,
+        steer: Steering,
+        departing: frozenset[int],
+        longest: float,
+    ) -> None:
+        self.system = tracer.system
+        self.model = tracer.model
+        self.formation = formation
+        self.contacts = formation.array
+        self.start = start
+        self.steer = steer
+        self.departing = departing
+        self.longest = longest
+        self.points = [start[None]]
+        self.step = STEP
+        self.fresh = True
+        gradients = self._gradients(start[None], self.contacts)[0]
+        chosen = independent_rows(gradients)
+        self.rows: IntArray = self.contacts[list(chosen)]
+        self.redundant = len(chosen) < len(self.contacts)
+        self.basis = tangent_basis(gradients[list(chosen)])
+        self.stability: Stability | None = None
+
+    def _gradients(self, z: FloatArray, pairs: IntArray) -> FloatArray:
+        return gap_gradients(self.system, self.system.place(z), pairs)
+
+    def run(self) -> Trace:
+        z = self.start
+        length = 0.0
+        while length < self.longest:
+            direction = self.steer(z, self.basis)
+            if direction is None:
+                return self._finish(EventKind.TARGET)
+            samples = self._stretch(z, direction)
+            if samples is None:
+                return self._finish(EventKind.LOST)
+            ended = self._advance(samples, direction)
+            if ended is not None:
+                return ended
+            z = self.points[-1][-1]
+            length += float(np.abs(z - samples[0]).max())
+        return self._finish(EventKind.LOST)
+
+    def _finish(self, kind: EventKind, pairs: tuple[int, ...] = ()) -> Trace:
+        return Trace(np.concatenate(self.points), kind, pairs)
+
+    def _stretch(self, z: FloatArray, direction: FloatArray) -> FloatArray | None:
+        """Points ahead along a direction, shape (s, 3 + n), z first; None if there are none."""
+        while self.step > _SMALLEST_STEP:
+            steps = np.arange(1, _STRETCH + 1) * (self.step / np.abs(direction).max())
+            if self.fresh:
+                # A short first step shows what holds just behind the start.
+                steps = np.concatenate([[0.02 * steps[0]], steps])
+            found = project(
+                self.system, self.rows, z, self.basis, z + steps[:, None] * direction
+            )
+            samples = np.concatenate([z[None], found.points])
+            change = np.abs(np.diff(samples, axis=0)).max(axis=1)
+            smooth = found.converged & (change < 1.5 * self.step)
+            count = int(np.argmin(smooth)) if not smooth.all() else len(smooth)
+            if count > (1 if self.fresh else 0):
+                if count < len(smooth):
+                    self.step *= 0.5
+                return samples[: count + 1]
+            self.step *= 0.25
+        return None
+
+    def _advance(self, samples: FloatArray, direction: FloatArray) -> Trace | None:
+        """Take the samples up to the first event; return the finished trace if there is one."""
+        placed = self.system.place(samples)
+        gradients = gap_gradients(self.system, placed, self.contacts)
+        if self.fresh and self.departing and self._penetrates(samples[1:2]):
+            return self._finish(EventKind.CONTACT, tuple(sorted(self.departing)))
+        sighting = sight(self.system, self.formation, samples, placed, self.fresh)
+        margins = self.model.margins(gradients)
+        if self.stability is None:
+            self.stability = classify(Margins(margins.stable[1:2], margins.form_closure[1:2]))
+            if self.stability is Stability.UNSTABLE:
+                return self._finish(EventKind.UNSTABLE)
+        changed = self._class_changes(margins)
+        if self.redundant:
+            apart = np.abs(gaps(self.system, placed, self.contacts).gap).max(axis=1) > 1e-7
+            if apart.any() and int(np.argmax(apart)) <= min(changed, sighting.interval):
+                return self._finish(EventKind.LOST)
+        if changed < sighting.interval or (changed == sighting.interval and not sighting.closer):
+            candidates = sighting.candidates if changed == sighting.interval else ()
+            ended = self._end(samples, changed, candidates, direction)
+            if ended is not None:
+                return ended
+        elif sighting.closer and self.step > STEP / 100:
+            interval = max(sighting.interval, 1)
+            self._take(samples[1 : interval + 1])
+            self.step *= 0.125
+        elif sighting.candidates:
+            ended = self._end(samples, sighting.interval, sighting.candidates, direction)
+            if ended is not None:
+                return ended
+        else:
+            self._take(samples[1:])
+            self.step = min(2.0 * self.step, STEP)
+        self.basis = self._next_basis()
+        return None
+
+    def _take(self, samples: FloatArray) -> None:
+        self.points.append(samples)
+        self.fresh = False
+
+    def _next_basis(self) -> FloatArray:
+        gradients = self._gradients(self.points[-1][-1:], self.rows)[0]
+        return tangent_basis(gradients)
+
+    def _penetrates(self, z: FloatArray) -> bool:
+        pairs = np.array(sorted(self.departing), dtype=np.intp)
+        gap, offset = gaps(self.system, self.system.place(z), pairs)
+        within = (offset >= 0.0) & (offset <= self.system.pair_length[pairs])
+        return bool((within & (gap < -1e-12)).any())
+
+    def _class_changes(self, margins: Margins) -> int:
+        """First interval behind which the stability class differs; huge if none."""
+        stable = margins.stable[1:] > STABILITY_MARGIN
+        form = margins.form_closure[1:] > STABILITY_MARGIN
+        same = stable & (form == (self.stability is Stability.FORM_CLOSURE))
+        return int(np.argmin(same)) if not same.all() else np.iinfo(int).max
+
+    def _end(
+        self,
+        samples: FloatArray,
+        interval: int,
+        candidates: tuple[Candidate, ...],
+        direction: FloatArray,
+    ) -> Trace | None:
+        """Locate the first of the events in an interval and finish, or go on if it was none."""
+        before, after = samples[interval], samples[interval + 1]
+        unit = direction / float(direction @ direction)
+
+        def along(z: FloatArray) -> float:
+            return float((z - samples[0]) @ unit)
+
+        low, high = along(before), along(after)
+        slack = 1e-6 + 0.01 * (high - low)
+        located: list[tuple[float, FloatArray, EventKind, int]] = []
+        change = self._locate_class_change(samples[0], before, after, direction)
+        if change is not None:
+            located.append((along(change[0]), *change, -1))
+        tried: set[int] = set()
+        while candidates:
+            for candidate in candidates:
+                tried.add(candidate.index)
+                guess = before + candidate.fraction * (after - before)
+                z = self._locate(candidate, guess, samples[0], direction)
+                if z is None or not low - slack <= along(z) <= high + slack:
+                    # Newton's method ran to another root: start it inside a bracket.
+                    guess = self._bracketed(candidate, samples[0], before, after)
+                    z = self._locate(candidate, guess, samples[0], direction)
+                if z is None or not low - slack <= along(z) <= high + slack:
+                    continue
+                if self._happens(candidate, z):
+                    located.append((along(z), z, candidate.kind, candidate.index))
+            if not located:
+                break
+            # A gap may have closed and, where its vertex left the edge, opened within the interval.
+            high, after, _, _ = min(located, key=lambda item: item[0])
+            both = np.stack([before, after])
+            sighting = sight(
+                self.system, self.formation, both, self.system.place(both), self.fresh
+            )
+            candidates = tuple(c for c in sighting.candidates if c.index not in tried)
+        self._take(samples[1 : interval + 1])
+        if not located:
+            self._take(samples[interval + 1 : interval + 2])
+            return None
+        at, z, kind, _ = min(located, key=lambda item: item[0])
+        together = tuple(sorted(i for s, _, k, i in located if k is kind and s <= at + 1e-9))
+        self._take(z[None])
+        return self._finish(kind, together)
+
+    def _locate(
+        self,
+        candidate: Candidate,
+        guess: FloatArray,
+        origin: FloatArray,
+        direction: FloatArray,
+    ) -> FloatArray | None:
+        """Newton's method on the contacts, the event and the coordinates across the motion."""
+        system = self.system
+        across = self.basis
+        if len(across) > 1:
+            unit = direction / np.linalg.norm(direction)
+            across = tangent_basis(np.concatenate([tangent_basis(self.basis), unit[None]]))
+        else:
+            across = across[:0]
+        z = guess.copy()
+        k = len(self.rows)
+        pair = np.array([max(candidate.index, 0)], dtype=np.intp)
+        matrix = np.empty((system.dof, system.dof))
+        residual = np.empty(system.dof)
+        for _ in range(20):
+            placed = system.place(z[None])
+            matrix[:k] = gap_gradients(system, placed, self.rows)[0]
+            residual[:k] = gaps(system, placed, self.rows).gap[0]
+            if candidate.kind is EventKind.JOINT_LIMIT:
+                matrix[k] = 0.0
+                matrix[k, 3 + candidate.index] = 1.0
+                residual[k] = z[3 + candidate.index] - candidate.target
+            elif candidate.kind is EventKind.EDGE_END:
+                matrix[k] = offset_gradients(system, placed, pair)[0, 0]
+                residual[k] = gaps(system, placed, pair).offset[0, 0] - candidate.target
+            else:
+                matrix[k] = gap_gradients(system, placed, pair)[0, 0]
+                residual[k] = gaps(system, placed, pair).gap[0, 0]
+            matrix[k + 1 :] = across
+            residual[k + 1 :] = across @ (z - origin)
+            try:
+                step = np.linalg.solve(matrix, residual)
+            except np.linalg.LinAlgError:
+                return None
+            z = z - step
+            change = float(np.abs(step).max())
+            if change > 1.0:
+                return None
+            if change < _LOCATED:
+                break
+        else:
+            return None
+        return z
+
+    def _happens(self, candidate: Candidate, z: FloatArray) -> bool:
+        """Tell whether a located gap is zero on its edge, and not beyond its ends."""
+        if candidate.kind not in (EventKind.CONTACT, EventKind.LINKS_MEET):
+            return True
+        pair = np.array([candidate.index], dtype=np.intp)
+        offset = float(gaps(self.system, self.system.place(z[None]), pair).offset[0, 0])
+        return -1e-9 <= offset <= float(self.system.pair_length[candidate.index]) + 1e-9
+
+    def _value(self, candidate: Candidate, z: FloatArray) -> float:
+        """Function whose root the event is, at z of shape (3 + n,)."""
+        if candidate.kind is EventKind.JOINT_LIMIT:
+            return float(z[3 + candidate.index]) - candidate.target
+        pair = np.array([candidate.index], dtype=np.intp)
+        gap, offset = gaps(self.system, self.system.place(z[None]), pair)
+        if candidate.kind is EventKind.EDGE_END:
+            return float(offset[0, 0]) - candidate.target
+        return float(gap[0, 0])
+
+    def _bracketed(
+        self, candidate: Candidate, origin: FloatArray, before: FloatArray, after: FloatArray
+    ) -> FloatArray:
+        """Brent's method between two points; the second one if the function has no sign change."""
+
+        def at(fraction: float) -> FloatArray:
+            guess = before + fraction * (after - before)
+            return project(self.system, self.rows, origin, self.basis, guess[None]).points[0]
+
+        def value(fraction: float) -> float:
+            return self._value(candidate, at(fraction))
+
+        if value(0.0) * value(1.0) >= 0.0:
+            return after
+        return at(root(value))
+
+    def _locate_class_change(
+        self, origin: FloatArray, before: FloatArray, after: FloatArray, direction: FloatArray
+    ) -> tuple[FloatArray, EventKind] | None:
+        """Brent's method on the margins between two points, if the class differs at the second."""
+        form = self.stability is Stability.FORM_CLOSURE
+
+        def at(fraction: float) -> FloatArray:
+            guess = before + fraction * (after - before)
+            return project(self.system, self.rows, origin, self.basis, guess[None]).points
+
+        def margins(fraction: float) -> Margins:
+            return self.model.margins(self._gradients(at(fraction), self.contacts))
+
+        def stable(fraction: float) -> float:
+            return float(margins(fraction).stable[0]) - STABILITY_MARGIN
+
+        def form_closure(fraction: float) -> float:
+            return float(margins(fraction).form_closure[0]) - STABILITY_MARGIN
+
+        for function, kind, wanted in (
+            (form_closure, EventKind.CLASS_CHANGE, form),
+            (stable, EventKind.UNSTABLE, True),
+        ):
+            ends = function(0.0) > 0.0, function(1.0) > 0.0
+            if kind is EventKind.UNSTABLE and form:
+                continue
+            if ends[1] == wanted:
+                continue
+            if ends[0] != wanted:
+                return at(0.0)[0], kind
+            place = root(function)
+            # Stay on the side that still holds.
+            holds = place if (function(place) > 0.0) == wanted else max(place - 2e-9, 0.0)
+            return at(holds)[0], kind
+        return None
