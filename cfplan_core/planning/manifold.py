@@ -108,3 +108,24 @@ def project(
             if (change > 10.0).any():
                 points[~(change <= 10.0)] = origin
     return Projected(points, gradients, change <= _CONVERGED)
+
+
+def settle(system: ContactSystem, z: FloatArray, pairs: IntArray) -> FloatArray:
+    """Move a configuration the least way to where contacts touch exactly.
+
+    Args:
+        system: Compiled problem.
+        z: Shape (3 + n,), touching up to rounding.
+        pairs: Contacts, dependent or not, shape (k,).
+
+    Returns:
+        Shape (3 + n,), by Gauss-Newton steps of least norm.
+    """
+    for _ in range(_ITERATIONS):
+        placed = system.place(z[None])
+        gradients = gap_gradients(system, placed, pairs)[0]
+        step = np.linalg.lstsq(gradients, gaps(system, placed, pairs).gap[0], rcond=1e-9)[0]
+        z = z - step
+        if np.abs(step).max() < 1e-14:
+            break
+    return z

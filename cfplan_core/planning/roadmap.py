@@ -1,14 +1,16 @@
-"""The graph that both CF-trees grow in: junctions joined by pieces of contact formations.
+"""The graph that both CF-trees grow in: pieces of contact formations joined at junctions.
 
-A *piece* is a connected part of one contact formation within one stability class. Pieces meet in
-*junctions*: configurations where a contact is made or broken, a vertex passes a vertex, or the
-stability class changes. Pieces are traced when first asked for and kept, so that the trees see
-the same piece as the same piece: where both hold it, they join.
+A *piece* is a connected part of one contact formation within one stability class: a point, a
+curve, or a region of higher dimension. Curves meet in *junctions*: configurations where a contact
+is made or broken, a vertex passes a vertex, or the stability class changes. Pieces are traced when
+first asked for and kept, so that both trees see the same piece as the same piece: where both hold
+it, they join.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,12 +19,12 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
-from cfplan_core.planning.events import OPEN_EVENTS, EventKind
-from cfplan_core.planning.manifold import independent_rows, tangent_basis
-from cfplan_core.planning.tracing import Trace, Tracer, classify
+from cfplan_core.planning.events import OPEN_EVENTS
+from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
+from cfplan_core.planning.tracing import STEP, Trace, Tracer, classify
 from cfplan_core.planning.transitions import Departure, Surroundings, departures, surroundings
 
-# Junctions nearer than this, in radians and object sizes, are the same.
+# Configurations nearer than this, in radians and object sizes, are the same.
 SAME = 1e-6
 
 
@@ -31,21 +33,21 @@ class Junction:
     """A configuration where pieces meet.
 
     Attributes:
-        index: Position in the roadmap.
         around: What touches there.
-        dimension: Of the formation of all touching contacts; zero for a point.
+        formation: All contacts that touch.
         stability: Of that formation; `UNSTABLE` if a vertex lies on a vertex.
+        isolated: True if that formation is a piece of its own: a point, stable.
         ways: Ways out, found when first asked for.
-        pieces: Piece for each way out that was taken, None where it led nowhere.
+        taken: Piece behind each way out that was taken, None where it led nowhere.
     """
 
-    index: int
     around: Surroundings
     formation: Formation
-    dimension: int
     stability: Stability
+    isolated: bool
     ways: list[Departure] | None = None
-    pieces: dict[int, Piece | None] = field(default_factory=dict)
+    taken: dict[int, Piece | None] = field(default_factory=dict)
+    point: Piece | None = None
 
     @property
     def z(self) -> FloatArray:
@@ -55,12 +57,13 @@ class Junction:
 
 @dataclass(eq=False)
 class Piece:
-    """A connected part of a contact formation within one stability class.
+    """A connected part of a contact formation within one stability class: a point or a curve.
 
     Attributes:
         index: Position in the roadmap.
         formation: The contacts.
         stability: The class.
+        dimension: 0 for a point, 1 for a curve.
         points: Shape (s, 3 + n), along the curve.
         ends: Junctions at the first and last point, None at a dead end.
     """
@@ -68,90 +71,186 @@ class Piece:
     index: int
     formation: Formation
     stability: Stability
+    dimension: int
     points: FloatArray
-    ends: tuple[Junction | None, Junction | None]
+    ends: tuple[Junction | None, ...]
+
+    def path(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        """Points from one configuration on the piece to another, shape (s, 3 + n)."""
+        if self.dimension == 0:
+            return start[None]
+        a, b = self._place(start), self._place(end)
+        low, high = min(a, b), max(a, b)
+        between = self.points[int(np.floor(low)) + 1 : int(np.ceil(high))]
+        if b < a:
+            between = between[::-1]
+        return np.concatenate([start[None], between, end[None]])
+
+    def _place(self, z: FloatArray) -> float:
+        """Where a configuration lies on the curve, in units of points."""
+        for place, end in ((0, self.points[0]), (len(self.points) - 1, self.points[-1])):
+            if np.abs(end - z).max() < SAME:
+                return float(place)
+        chord = np.diff(self.points, axis=0)
+        length = (chord**2).sum(axis=1)
+        fraction = ((z - self.points[:-1]) * chord).sum(axis=1) / np.where(length > 0, length, 1)
+        fraction = np.clip(fraction, 0.0, 1.0)
+        near = self.points[:-1] + fraction[:, None] * chord
+        interval = int(np.argmin(np.abs(near - z).max(axis=1)))
+        return interval + float(fraction[interval])
 
 
 class Roadmap:
     """Junctions and pieces found so far.
 
     Attributes:
+        pieces: In the order in which they were found.
         failures: Why transitions failed, with how often.
         attempts: How many transitions were tried.
     """
 
-    def __init__(self, system: ContactSystem, model: ContactModel) -> None:
+    def __init__(
+        self,
+        system: ContactSystem,
+        model: ContactModel,
+        checkpoint: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Start empty.
+
+        Args:
+            system: Compiled problem.
+            model: Mechanics.
+            checkpoint: Called before every piece of work; may raise to interrupt.
+        """
         self.system = system
         self.model = model
         self.tracer = Tracer(system, model)
-        self.junctions: list[Junction] = []
         self.pieces: list[Piece] = []
         self.failures: Counter[str] = Counter()
         self.attempts = 0
-        self._nearby: dict[tuple[int, ...], list[Junction]] = {}
+        self._checkpoint = checkpoint
+        self._junctions: list[Junction] = []
+        self._cells: dict[tuple[int, ...], list[Junction]] = {}
+        self._curves: dict[tuple[Formation, Stability], list[Piece]] = {}
 
     def formations(self) -> int:
-        """Count the distinct contact formations met."""
-        return len({p.formation for p in self.pieces} | {j.formation for j in self.junctions})
+        """Count the distinct contact formations that were met."""
+        known = {piece.formation for piece in self.pieces}
+        known |= {junction.formation for junction in self._junctions}
+        return len(known)
+
+    def root(self, z: FloatArray) -> Piece:
+        """Return the piece that a stable configuration, shape (3 + n,), lies in.
+
+        Raises:
+            ValueError: The configuration's formation is of dimension two or more.
+        """
+        junction = self.junction(z)
+        if junction.isolated:
+            return self._point(junction)
+        rows = list(independent_rows(junction.around.gradients))
+        if self.system.dof - len(rows) != 1:
+            raise ValueError(f'formation of dimension {self.system.dof - len(rows)}')
+        known = self._on_curve(junction.formation, junction.stability, z)
+        if known is not None:
+            return known
+        (tangent,) = tangent_basis(junction.around.gradients[rows])
+        ways = [
+            Departure(junction.formation, sign * tangent, frozenset()) for sign in (1.0, -1.0)
+        ]
+        ahead, behind = (self._follow(z, way) for way in ways)
+        points = np.concatenate([behind.points[:0:-1], ahead.points])
+        ends = (self._end(behind), self._end(ahead))
+        return self._add_curve(junction.formation, junction.stability, points, ends)
+
+    def neighbours(self, piece: Piece) -> Iterator[tuple[Junction, Piece]]:
+        """Pieces next to a piece, each with the junction that lies between."""
+        for junction in dict.fromkeys(piece.ends):
+            if junction is None:
+                continue
+            if junction.isolated and piece.dimension > 0:
+                yield junction, self._point(junction)
+                continue
+            for way in range(len(self._ways(junction))):
+                self._checkpoint()
+                taken = self._take(junction, way)
+                if taken is not None and taken is not piece:
+                    yield junction, taken
 
     def junction(self, z: FloatArray) -> Junction:
         """Return the junction at a configuration, shape (3 + n,), making it if it is new."""
-        cell = np.round(z / (4.0 * SAME)).astype(int)
-        low = np.floor((z - SAME) / (4.0 * SAME) + 0.5).astype(int)
-        high = np.floor((z + SAME) / (4.0 * SAME) + 0.5).astype(int)
-        keys = {tuple(int(c) for c in cell)}
-        if (low != high).any():
-            keys |= {tuple(int(c) for c in low), tuple(int(c) for c in high)}
-        for key in sorted(keys):
-            for junction in self._nearby.get(key, ()):
+        cells = self._cells_around(z)
+        for cell in cells:
+            for junction in self._cells.get(cell, ()):
                 if np.abs(junction.z - z).max() < SAME:
                     return junction
         around = surroundings(self.system, z)
-        formation = Formation(tuple(int(p) for p in around.pairs))
-        dimension = self.system.dof - len(independent_rows(around.gradients))
         stability = Stability.UNSTABLE
-        if not around.held_vertex and len(around.pairs):
+        if len(around.pairs) and not around.held_vertex:
             stability = classify(self.model.margins(around.gradients[None]))
-        junction = Junction(len(self.junctions), around, formation, dimension, stability)
-        self.junctions.append(junction)
-        for key in sorted(keys):
-            self._nearby.setdefault(key, []).append(junction)
+        isolated = (
+            stability is not Stability.UNSTABLE
+            and len(independent_rows(around.gradients)) == self.system.dof
+        )
+        formation = Formation(tuple(int(pair) for pair in around.pairs))
+        junction = Junction(around, formation, stability, isolated)
+        self._junctions.append(junction)
+        for cell in cells:
+            self._cells.setdefault(cell, []).append(junction)
         return junction
 
-    def ways(self, junction: Junction) -> list[Departure]:
-        """Ways out of a junction."""
+    @staticmethod
+    def _cells_around(z: FloatArray) -> list[tuple[int, ...]]:
+        """Cells of a grid, four times `SAME` wide, that a neighbourhood of z reaches into."""
+        low = np.floor((z - SAME) / (4.0 * SAME)).astype(int)
+        high = np.floor((z + SAME) / (4.0 * SAME)).astype(int)
+        cells: list[tuple[int, ...]] = [()]
+        for first, last in zip(low, high, strict=True):
+            choices = (int(first),) if first == last else (int(first), int(last))
+            cells = [(*cell, choice) for cell in cells for choice in choices]
+        return cells
+
+    def _point(self, junction: Junction) -> Piece:
+        if junction.point is None:
+            junction.point = Piece(
+                len(self.pieces),
+                junction.formation,
+                junction.stability,
+                0,
+                junction.z[None],
+                (junction,),
+            )
+            self.pieces.append(junction.point)
+        return junction.point
+
+    def _ways(self, junction: Junction) -> list[Departure]:
         if junction.ways is None:
             junction.ways = departures(
                 junction.around, self.model, self.system.dof, self.failures
             )
-            self.attempts += len(junction.ways)
         return junction.ways
 
-    def take(self, junction: Junction, way: int) -> Piece | None:
+    def _take(self, junction: Junction, way: int) -> Piece | None:
         """Follow one way out of a junction; None if it ends at once."""
-        if way not in junction.pieces:
-            departure = self.ways(junction)[way]
-            trace = self._follow(departure.formation, junction.z, departure)
-            if np.abs(trace.end - junction.z).max() < SAME:
-                junction.pieces[way] = None
-                self.failures[f'at once {trace.kind.value}'] += 1
-            else:
-                self._add_piece(departure.formation, trace.points, (junction, self._end(trace)))
-        return junction.pieces[way]
+        if way not in junction.taken:
+            junction.taken[way] = self._trace(junction, self._ways(junction)[way])
+        return junction.taken[way]
 
-    def through(self, z: FloatArray, formation: Formation) -> Piece:
-        """Trace the piece of a one-dimensional formation through a point inside it."""
-        junction = self.junction(z)
-        gradients = junction.around.gradients
-        tangent = tangent_basis(gradients[list(independent_rows(gradients))])[0]
-        halves = [
-            self._follow(formation, z, Departure(formation, sign * tangent, frozenset()))
-            for sign in (1.0, -1.0)
-        ]
-        points = np.concatenate([halves[1].points[:0:-1], halves[0].points])
-        return self._add_piece(formation, points, (self._end(halves[1]), self._end(halves[0])))
+    def _trace(self, junction: Junction, departure: Departure) -> Piece | None:
+        self.attempts += 1
+        trace = self._follow(junction.z, departure)
+        if np.abs(trace.end - junction.z).max() < SAME:
+            self.failures[f'at once, {trace.kind.value}'] += 1
+            return None
+        formation = departure.formation
+        middle = trace.points[len(trace.points) // 2]
+        stability = classify(self.tracer.margins(formation, middle[None]))
+        known = self._on_curve(formation, stability, middle)
+        if known is not None:
+            return known
+        return self._add_curve(formation, stability, trace.points, (junction, self._end(trace)))
 
-    def _follow(self, formation: Formation, z: FloatArray, departure: Departure) -> Trace:
+    def _follow(self, z: FloatArray, departure: Departure) -> Trace:
         heading = departure.direction
 
         def steer(_: FloatArray, basis: FloatArray) -> FloatArray:
@@ -159,7 +258,7 @@ class Roadmap:
             heading = basis[0] if basis[0] @ heading > 0.0 else -basis[0]
             return heading
 
-        return self.tracer.follow(formation, z, steer, departure.departing)
+        return self.tracer.follow(departure.formation, z, steer, departure.departing)
 
     def _end(self, trace: Trace) -> Junction | None:
         if trace.kind in OPEN_EVENTS:
@@ -167,21 +266,44 @@ class Roadmap:
         self.failures[trace.kind.value] += 1
         return None
 
-    def _add_piece(
+    def _add_curve(
         self,
         formation: Formation,
+        stability: Stability,
         points: FloatArray,
         ends: tuple[Junction | None, Junction | None],
     ) -> Piece:
-        middle = points[len(points) // 2][None]
-        stability = classify(self.tracer.margins(formation, middle))
-        piece = Piece(len(self.pieces), formation, stability, points, ends)
+        piece = Piece(len(self.pieces), formation, stability, 1, points, ends)
         self.pieces.append(piece)
+        self._curves.setdefault((formation, stability), []).append(piece)
         for junction, z in zip(ends, (points[1], points[-2]), strict=True):
             if junction is None:
                 continue
-            for way, departure in enumerate(self.ways(junction)):
-                leads = (z - junction.z) @ departure.direction > 0.0
+            for way, departure in enumerate(self._ways(junction)):
+                leads = float((z - junction.z) @ departure.direction) > 0.0
                 if departure.formation == formation and leads:
-                    junction.pieces[way] = piece
+                    junction.taken[way] = piece
         return piece
+
+    def _on_curve(
+        self, formation: Formation, stability: Stability, z: FloatArray
+    ) -> Piece | None:
+        """Find the known curve of a formation that a configuration lies on."""
+        for piece in self._curves.get((formation, stability), ()):
+            near = np.abs(piece.points - z).max(axis=1)
+            if near.min() > 2.0 * STEP:
+                continue
+            rows = formation.array
+            gradients = self.tracer.gradients(z[None], rows)[0]
+            chosen = list(independent_rows(gradients))
+            basis = tangent_basis(gradients[chosen])
+            along = (piece.points - z) @ basis[0]
+            crossing = np.flatnonzero((along[:-1] * along[1:] <= 0.0) & (near[:-1] < 3.0 * STEP))
+            for i in crossing:
+                span = along[i + 1] - along[i]
+                fraction = -along[i] / span if span else 0.0
+                guess = piece.points[i] + fraction * (piece.points[i + 1] - piece.points[i])
+                found = project(self.system, rows[chosen], z, basis, guess[None])
+                if found.converged[0] and np.abs(found.points[0] - z).max() < SAME:
+                    return piece
+        return None

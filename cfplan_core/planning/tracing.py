@@ -81,8 +81,11 @@ class Tracer:
 
     def margins(self, formation: Formation, z: FloatArray) -> Margins:
         """Stability margins of a formation at configurations of shape (s, 3 + n)."""
-        gradients = gap_gradients(self.system, self.system.place(z), formation.array)
-        return self.model.margins(gradients)
+        return self.model.margins(self.gradients(z, formation.array))
+
+    def gradients(self, z: FloatArray, pairs: IntArray) -> FloatArray:
+        """Gap gradients of pairs at configurations of shape (s, 3 + n)."""
+        return gap_gradients(self.system, self.system.place(z), pairs)
 
     def follow(
         self,
@@ -118,6 +121,7 @@ class _Pursuit:
     ) -> None:
         self.system = tracer.system
         self.model = tracer.model
+        self._gradients = tracer.gradients
         self.formation = formation
         self.contacts = formation.array
         self.start = start
@@ -133,9 +137,6 @@ class _Pursuit:
         self.redundant = len(chosen) < len(self.contacts)
         self.basis = tangent_basis(gradients[list(chosen)])
         self.stability: Stability | None = None
-
-    def _gradients(self, z: FloatArray, pairs: IntArray) -> FloatArray:
-        return gap_gradients(self.system, self.system.place(z), pairs)
 
     def run(self) -> Trace:
         z = self.start

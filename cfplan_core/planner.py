@@ -1,0 +1,194 @@
+"""Plan: from a problem to its answer."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from cfplan_core.contact.system import ContactSystem
+from cfplan_core.errors import CfplanError
+from cfplan_core.mechanics.frictionless import FrictionlessModel
+from cfplan_core.model import Problem
+from cfplan_core.planning.grasp_check import check_problem, examine_grasp
+from cfplan_core.planning.roadmap import Roadmap
+from cfplan_core.planning.search import Search, Tree
+from cfplan_core.trajectory.frames import build_frames
+from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
+
+
+@dataclass(frozen=True)
+class PlanOptions:
+    """Limits of a search.
+
+    Attributes:
+        time_budget: Seconds, or None for no limit.
+        max_nodes: Nodes of both trees together, or None for no limit.
+    """
+
+    time_budget: float | None = None
+    max_nodes: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.time_budget is not None and not self.time_budget > 0.0:
+            raise CfplanError(f'time_budget: got {self.time_budget}, expected seconds above zero')
+        if self.max_nodes is not None and not self.max_nodes > 0:
+            raise CfplanError(f'max_nodes: got {self.max_nodes}, expected a number above zero')
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a search has come.
+
+    Attributes:
+        elapsed: Seconds since its start.
+        nodes: Nodes of the initial and of the goal tree.
+        formations: Distinct contact formations met.
+        message: What is being done.
+    """
+
+    elapsed: float
+    nodes: tuple[int, int]
+    formations: int
+    message: str
+
+
+class _BudgetExhaustedError(Exception):
+    """A search must stop; the message says why."""
+
+
+def plan(
+    problem: Problem,
+    options: PlanOptions | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    cancel: threading.Event | None = None,
+) -> PlanResult:
+    """Find how to carry the object from the start grasp to the goal grasp.
+
+    Same problem, same answer: nothing depends on the clock but the time budget.
+
+    Args:
+        problem: What to plan.
+        options: Budgets; none by default.
+        progress: Called, from this thread, whenever a tree has grown.
+        cancel: When set, also by another thread, the search ends as if its budget were exhausted.
+
+    Returns:
+        The plan, or why there is none. Never raises for a problem that cannot be planned.
+    """
+    return _Planning(problem, options or PlanOptions(), progress, cancel).run()
+
+
+class _Planning:
+    """One call of `plan`."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        options: PlanOptions,
+        progress: Callable[[Progress], None] | None,
+        cancel: threading.Event | None,
+    ) -> None:
+        self.problem = problem
+        self.options = options
+        self.progress = progress
+        self.cancel = cancel
+        self.began = time.perf_counter()
+        self.system = ContactSystem(problem)
+        self.model = FrictionlessModel(self.system.load)
+        self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
+        self.search: Search | None = None
+
+    def run(self) -> PlanResult:
+        findings = check_problem(self.problem)
+        if findings:
+            return self._answer(Status.INVALID, '\n'.join(str(finding) for finding in findings))
+        goal = self.problem.goal.grasp(self.problem.hand)
+        if goal is None:
+            return self._answer(Status.INVALID, 'goal: expected an object pose and all joints')
+        start, end = (
+            examine_grasp(self.system, self.model, grasp, name, '').z
+            for name, grasp in (('start', self.problem.start), ('goal', goal))
+        )
+        self.search = Search(self.roadmap, start, end, self._grown)
+        try:
+            joined = self.search.run()
+        except _BudgetExhaustedError as stop:
+            return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
+        if not joined:
+            return self._answer(Status.INFEASIBLE, f'no path; {self._explored()}')
+        frames = build_frames(self.system, self.model, self.search.path())
+        return replace(
+            self._answer(Status.SOLVED, ''),
+            times=frames.times,
+            joints=frames.joints,
+            object_poses=frames.object_poses,
+            torque_lower=frames.torque_lower,
+            torque_upper=frames.torque_upper,
+            segments=frames.segments,
+        )
+
+    def _checkpoint(self) -> None:
+        """Stop the search when it has to."""
+        if self.cancel is not None and self.cancel.is_set():
+            raise _BudgetExhaustedError('cancelled')
+        budget = self.options.time_budget
+        if budget is not None and time.perf_counter() - self.began > budget:
+            raise _BudgetExhaustedError(f'time budget of {budget:g} s exhausted')
+
+    def _grown(self, initial: int, goal: int) -> None:
+        if self.progress is not None:
+            elapsed = time.perf_counter() - self.began
+            formations = self.roadmap.formations()
+            self.progress(Progress(elapsed, (initial, goal), formations, 'growing the CF-trees'))
+        limit = self.options.max_nodes
+        if limit is not None and initial + goal > limit:
+            raise _BudgetExhaustedError(f'budget of {limit} nodes exhausted')
+
+    def _explored(self) -> str:
+        """What was searched, and why it did not lead on."""
+        failures = '; '.join(f'{n} × {why}' for why, n in self.roadmap.failures.most_common(5))
+        return (
+            f'explored {self.roadmap.formations()} contact formations by '
+            f'{self.roadmap.attempts} transitions; most frequent failures: {failures or "none"}'
+        )
+
+    def _answer(self, status: Status, message: str) -> PlanResult:
+        trees = self.search.trees if self.search is not None else ()
+        nodes = [len(tree.nodes) for tree in trees] or [0, 0]
+        statistics = Statistics(
+            planning_time=time.perf_counter() - self.began,
+            initial_tree_nodes=nodes[0],
+            goal_tree_nodes=nodes[1],
+            formations=self.roadmap.formations(),
+            transitions=self.roadmap.attempts,
+            failures=dict(self.roadmap.failures.most_common()),
+        )
+        pictures = tuple(self._tree_nodes(tree) for tree in trees)
+        return PlanResult(
+            problem=self.problem.name,
+            status=status,
+            joint_names=self.problem.hand.joint_names,
+            message=message,
+            statistics=statistics,
+            trees=(pictures[0], pictures[1]) if pictures else ((), ()),
+        )
+
+    def _tree_nodes(self, tree: Tree) -> tuple[TreeNode, ...]:
+        assert self.search is not None
+        initial, goal = self.search.trees
+        shared = initial.index_of.keys() & goal.index_of.keys()
+        meeting = self.search.meeting
+        on_path = [] if meeting is None else tree.chain(tree.index_of[meeting])
+        return tuple(
+            TreeNode(
+                parent=node.parent,
+                contacts=self.system.contact_names(node.piece.formation.pairs),
+                stability=node.piece.stability.value,
+                dimension=node.piece.dimension,
+                on_path=node in on_path,
+                shared=node.piece.index in shared,
+            )
+            for node in tree.nodes
+        )

@@ -1,0 +1,223 @@
+"""Whether the start and the goal of a problem are grasps that a plan may have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from cfplan_core.contact.detection import coincident, touching
+from cfplan_core.contact.gaps import gap_gradients, gaps
+from cfplan_core.contact.system import ContactSystem, IntArray
+from cfplan_core.errors import Finding
+from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.geometry.separation import penetration_depth
+from cfplan_core.mechanics.contact_model import ContactModel, Stability
+from cfplan_core.mechanics.frictionless import FrictionlessModel
+from cfplan_core.model import Grasp, Problem
+from cfplan_core.planning.manifold import independent_rows, settle
+from cfplan_core.planning.tracing import classify
+
+# Numbers in files are rounded: nearer than this, in m, is touching (cfplan/problem/1).
+TOUCHING = 1e-6
+# Gaps up to this part of the object's size are named when a grasp is not stable.
+_NEAR = 0.05
+
+
+@dataclass(frozen=True)
+class GraspDescription:
+    """What a grasp is.
+
+    Attributes:
+        contacts: Names of the elemental contacts that touch.
+        stability: ``form_closure``, ``force_closure`` or ``unstable``.
+        dimension: Dimension of the contact formation's piece of configuration space.
+    """
+
+    contacts: tuple[str, ...]
+    stability: str
+    dimension: int
+
+
+@dataclass(frozen=True, eq=False)
+class ExaminedGrasp:
+    """A grasp with its contacts made exact.
+
+    Attributes:
+        z: Shape (3 + n,), on the contacts.
+        pairs: Touching contacts, shape (k,).
+        stability: Of the formation.
+        dimension: Of the formation's piece.
+        findings: What is wrong with it.
+    """
+
+    z: FloatArray
+    pairs: IntArray
+    stability: Stability
+    dimension: int
+    findings: tuple[Finding, ...]
+
+
+def describe_grasp(problem: Problem, grasp: Grasp) -> GraspDescription:
+    """Name a grasp's contacts, stability class and dimension."""
+    system = ContactSystem(problem)
+    examined = examine_grasp(system, FrictionlessModel(system.load), grasp, '', '')
+    return GraspDescription(
+        system.contact_names([int(pair) for pair in examined.pairs]),
+        examined.stability.value,
+        examined.dimension,
+    )
+
+
+def check_problem(problem: Problem, file: str = '<problem>') -> tuple[Finding, ...]:
+    """Find what keeps a well-formed problem from being planned.
+
+    Args:
+        problem: As loaded.
+        file: Named in the findings.
+
+    Returns:
+        Findings on start and goal: links or object that overlap, contacts that do not touch, an
+        unstable grasp, friction that no contact model takes.
+    """
+    findings = []
+    if problem.friction > 0.0:
+        findings.append(
+            Finding(file, 'contact.friction', f'{problem.friction:g}', '0.0: contacts without friction')
+        )
+    system = ContactSystem(problem)
+    model = FrictionlessModel(system.load)
+    findings += examine_grasp(system, model, problem.start, 'start', file).findings
+    goal = problem.goal.grasp(problem.hand)
+    if goal is not None:
+        examined = examine_grasp(system, model, goal, 'goal', file)
+        findings += examined.findings
+        findings += _missing_contacts(system, examined, problem.goal.contacts or (), file)
+    return tuple(findings)
+
+
+def examine_grasp(
+    system: ContactSystem, model: ContactModel, grasp: Grasp, field: str, file: str
+) -> ExaminedGrasp:
+    """Detect a grasp's contacts, make them exact and judge the grasp.
+
+    Args:
+        system: Compiled problem.
+        model: Judges stability.
+        grasp: What to examine.
+        field: Name of the grasp in findings, ``start`` or ``goal``.
+        file: Named in findings.
+    """
+    findings = _overlaps(system.problem, grasp, field, file)
+    z = system.configuration(grasp)
+    pairs = touching(system, z, TOUCHING / system.size)
+    dimension, stability = system.dof, Stability.UNSTABLE
+    if len(pairs):
+        z = settle(system, z, pairs)
+        gradients = gap_gradients(system, system.place(z[None]), pairs)
+        dimension -= len(independent_rows(gradients[0]))
+        stability = classify(model.margins(gradients))
+    together = coincident(system, z, pairs, TOUCHING / system.size)
+    names = system.contact_names([int(pair) for pair in pairs])
+    if not len(pairs):
+        findings.append(
+            Finding(
+                file,
+                field,
+                f'no contact{_near_misses(system, z, pairs)}',
+                f'contacts within {TOUCHING:g} m that hold the object',
+            )
+        )
+    elif together.any():
+        i, j = (int(k) for k in np.argwhere(together)[0])
+        findings.append(
+            Finding(
+                file,
+                field,
+                f'a vertex on a vertex ({names[i]} and {names[j]} at one place)',
+                'vertices on the inside of edges: a vertex cannot be held on a vertex',
+            )
+        )
+    elif stability is Stability.UNSTABLE and not findings:
+        margin = float(model.margins(gradients).stable[0])
+        findings.append(
+            Finding(
+                file,
+                field,
+                f'an unstable grasp, contacts {", ".join(names)} '
+                f'(stability margin {margin:.3g}){_near_misses(system, z, pairs)}',
+                'contacts whose forces, all positive, balance the weight (margin above zero)',
+            )
+        )
+    return ExaminedGrasp(z, pairs, stability, dimension, tuple(findings))
+
+
+def _near_misses(system: ContactSystem, z: FloatArray, pairs: IntArray) -> str:
+    """Name the contacts that nearly touch."""
+    everything = np.arange(system.contact_count)
+    gap, offset = (values[0] for values in gaps(system, system.place(z[None]), everything))
+    near = (gap > 0.0) & (gap < _NEAR) & (offset >= 0.0) & (offset <= system.pair_length[everything])
+    near[pairs] = False
+    missed = sorted(np.flatnonzero(near), key=lambda pair: gap[pair])[:4]
+    if not missed:
+        return ''
+    named = (f'{system.contact(int(p))} is {gap[p] * system.size:.3g} m apart' for p in missed)
+    return '; ' + ', '.join(named)
+
+
+def _overlaps(problem: Problem, grasp: Grasp, field: str, file: str) -> list[Finding]:
+    """Find bodies that reach into each other."""
+    bodies = problem.hand.world_vertices(grasp.joints)
+    body = problem.object.world_vertices(grasp.object_pose)
+    findings = []
+    for name, vertices in bodies.items():
+        depth = penetration_depth(body, vertices)
+        if depth > TOUCHING:
+            findings.append(
+                Finding(
+                    file,
+                    f'{field}.object_pose',
+                    f'the object {depth:.3g} m deep in {name}',
+                    f'at most {TOUCHING:g} m',
+                )
+            )
+    for first, second in _separate_bodies(problem):
+        depth = penetration_depth(bodies[first], bodies[second])
+        if depth > TOUCHING:
+            findings.append(
+                Finding(
+                    file,
+                    f'{field}.joints',
+                    f'{first} and {second} overlapping by {depth:.3g} m',
+                    f'at most {TOUCHING:g} m',
+                )
+            )
+    return findings
+
+
+def _separate_bodies(problem: Problem) -> list[tuple[str, str]]:
+    """Pairs of hand bodies that may not overlap: not a first link and the palm, nor neighbours."""
+    palm = [f'palm.{k}' for k in range(len(problem.hand.palm))]
+    chains = [
+        [f'{finger.name}.{link.name}' for link in finger.links] for finger in problem.hand.fingers
+    ]
+    pairs = [(body, link) for chain in chains for link in chain[1:] for body in palm]
+    for chain in chains:
+        pairs += [(a, b) for i, a in enumerate(chain) for b in chain[i + 2 :]]
+    for one, other in combinations(chains, 2):
+        pairs += [(a, b) for a in one for b in other]
+    return pairs
+
+
+def _missing_contacts(
+    system: ContactSystem, examined: ExaminedGrasp, wanted: tuple[str, ...], file: str
+) -> list[Finding]:
+    """Contacts that the goal names and that do not touch in it."""
+    names = system.contact_names([int(pair) for pair in examined.pairs])
+    return [
+        Finding(file, 'goal.contacts', f'{name}, which does not touch in the goal grasp', 'a contact of '
+                f'the goal grasp: {", ".join(names) or "none"}')
+        for name in wanted
+        if name not in names
+    ]

@@ -1,0 +1,161 @@
+"""Grow the two CF-trees, from the start and from the goal, until they hold a common piece.
+
+Trinkle & Hunter (1991), Section 2.2. The trees grow a level at a time, the smaller one first, and
+join where the path through both has fewest pieces. As the model is reversible both grow by the
+same transitions, and a complete tree that does not hold the other's root is proof that there is
+no path in the pieces explored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cfplan_core.contact.formation import Formation
+from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.contact_model import Stability
+from cfplan_core.planning.roadmap import Junction, Piece, Roadmap
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A stretch of a path inside one piece.
+
+    Attributes:
+        formation: The contacts.
+        stability: The class.
+        points: Shape (s, 3 + n); the first is the last of the leg before.
+    """
+
+    formation: Formation
+    stability: Stability
+    points: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A node of a CF-tree.
+
+    Attributes:
+        piece: What the tree holds.
+        parent: Index of the parent node, None for the root.
+        entry: The junction on the arc from the parent.
+        depth: Number of arcs from the root.
+    """
+
+    piece: Piece
+    parent: int | None
+    entry: Junction | None
+    depth: int
+
+
+@dataclass(eq=False)
+class Tree:
+    """One CF-tree.
+
+    Attributes:
+        root: Configuration that it grows from, shape (3 + n,).
+        nodes: Parents before children.
+    """
+
+    root: FloatArray
+    nodes: list[Node] = field(default_factory=list)
+    frontier: list[int] = field(default_factory=list)
+    index_of: dict[int, int] = field(default_factory=dict)
+
+    def add(self, node: Node) -> int:
+        """Add a node to the tree's outermost level and return its index."""
+        self.nodes.append(node)
+        self.index_of[node.piece.index] = len(self.nodes) - 1
+        return len(self.nodes) - 1
+
+    def chain(self, index: int) -> list[Node]:
+        """Nodes from the root to a node."""
+        nodes = []
+        at: int | None = index
+        while at is not None:
+            nodes.append(self.nodes[at])
+            at = self.nodes[at].parent
+        return nodes[::-1]
+
+
+class Search:
+    """Two trees over one roadmap.
+
+    Attributes:
+        roadmap: What was explored.
+        trees: The initial and the goal tree.
+        meeting: Index of the piece where they joined, or None.
+    """
+
+    def __init__(
+        self,
+        roadmap: Roadmap,
+        start: FloatArray,
+        goal: FloatArray,
+        grown: Callable[[int, int], None] = lambda initial, goal: None,
+    ) -> None:
+        """Root the trees.
+
+        Args:
+            roadmap: To grow in.
+            start: Stable configuration, shape (3 + n,).
+            goal: Stable configuration, shape (3 + n,).
+            grown: Called with the numbers of nodes whenever one is added; may raise to interrupt.
+        """
+        self.roadmap = roadmap
+        self.trees = (Tree(start), Tree(goal))
+        self.meeting: int | None = None
+        self._grown = grown
+
+    def run(self) -> bool:
+        """Grow until the trees join (true) or one of them is complete without it (false)."""
+        for tree in self.trees:
+            tree.frontier = [tree.add(Node(self.roadmap.root(tree.root), None, None, 0))]
+        if self.trees[0].nodes[0].piece is self.trees[1].nodes[0].piece:
+            self.meeting = self.trees[0].nodes[0].piece.index
+        while self.meeting is None and all(tree.frontier for tree in self.trees):
+            initial, goal = self.trees
+            smaller = 0 if len(initial.frontier) <= len(goal.frontier) else 1
+            self._grow(self.trees[smaller], self.trees[1 - smaller])
+        return self.meeting is not None
+
+    def _grow(self, tree: Tree, other: Tree) -> None:
+        """Add a level to a tree; join at the common piece of least depth, if there is one."""
+        level = []
+        best: tuple[int, int] | None = None
+        for index in tree.frontier:
+            node = tree.nodes[index]
+            for junction, piece in self.roadmap.neighbours(node.piece):
+                if piece.index in tree.index_of:
+                    continue
+                level.append(tree.add(Node(piece, index, junction, node.depth + 1)))
+                if piece.index in other.index_of:
+                    depth = node.depth + 1 + other.nodes[other.index_of[piece.index]].depth
+                    best = min(best or (depth, piece.index), (depth, piece.index))
+                self._grown(len(self.trees[0].nodes), len(self.trees[1].nodes))
+        tree.frontier = level
+        if best is not None:
+            self.meeting = best[1]
+
+    def path(self) -> list[Leg]:
+        """Join the arcs from start to goal; only after `run` returned true.
+
+        Legs of one point are left out: the legs beside them share the point.
+        """
+        assert self.meeting is not None
+        initial, goal = (tree.chain(tree.index_of[self.meeting]) for tree in self.trees)
+        pieces = [node.piece for node in initial] + [node.piece for node in goal[-2::-1]]
+        stops = [self.trees[0].root]
+        stops += [node.entry.z for node in initial if node.entry is not None]
+        stops += [node.entry.z for node in reversed(goal) if node.entry is not None]
+        stops.append(self.trees[1].root)
+        legs = []
+        for piece, begin, end in zip(pieces, stops[:-1], stops[1:], strict=True):
+            points = piece.path(begin, end)
+            still = len(points) < 2 or not np.abs(points - points[0]).max() > 0.0
+            if not still or len(pieces) == 1:
+                legs.append(Leg(piece.formation, piece.stability, points))
+        return legs

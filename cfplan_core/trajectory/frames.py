@@ -1,0 +1,136 @@
+"""Turn a path through contact formations into the frames and segments of a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cfplan_core.contact.gaps import gap_gradients
+from cfplan_core.contact.system import ContactSystem
+from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.contact_model import ContactModel
+from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
+from cfplan_core.planning.search import Leg
+from cfplan_core.trajectory.plan_result import Segment
+
+# Largest change between frames: of a joint, of the object's angle, both in rad, and of its
+# position, in object sizes (the format cfplan/plan/1 allows 0.05 of each).
+_LARGEST = 0.048
+# Frames inside a segment nearer than this are left out.
+_SMALLEST = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Frames of a plan in SI units, without names; see `PlanResult` for the shapes."""
+
+    times: FloatArray
+    joints: FloatArray
+    object_poses: FloatArray
+    torque_lower: FloatArray
+    torque_upper: FloatArray
+    segments: tuple[Segment, ...]
+
+
+def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> Frames:
+    """Sample a path into frames.
+
+    A frame shared by two segments carries the torque limits of the earlier one. Times follow from
+    the joints' velocity limits: one joint moves at its limit.
+
+    Args:
+        system: Compiled problem.
+        model: Gives the torque limits.
+        legs: From start to goal, each beginning where the one before ends.
+    """
+    points: list[FloatArray] = []
+    lower: list[FloatArray] = []
+    upper: list[FloatArray] = []
+    segments: list[Segment] = []
+    first = 0
+    for index, leg in enumerate(legs):
+        z = _evenly(system, leg)
+        low, high = _torque_limits(system, model, leg, z)
+        segments.append(
+            Segment(
+                system.contact_names(leg.formation.pairs),
+                leg.stability.value,
+                first,
+                first + len(z) - 1,
+            )
+        )
+        shared = 0 if index == 0 else 1
+        points.append(z[shared:])
+        lower.append(low[shared:])
+        upper.append(high[shared:])
+        first += len(z) - 1
+    z = np.concatenate(points)
+    return Frames(
+        _times(system, z[:, 3:]),
+        z[:, 3:],
+        system.object_poses(z),
+        np.concatenate(lower),
+        np.concatenate(upper),
+        tuple(segments),
+    )
+
+
+def _change(system: ContactSystem, z: FloatArray) -> FloatArray:
+    """Largest change from each point to the next, shape (s - 1,): rad and object sizes."""
+    step = np.abs(np.diff(z[:, 2:], axis=0)).max(axis=1)
+    frame = system.object_poses(z)[:, :2] / system.size
+    # The plan gives the object's frame, its mechanics the centre of mass: both move slowly.
+    for place in (frame, z[:, :2]):
+        step = np.maximum(step, np.linalg.norm(np.diff(place, axis=0), axis=1))
+    return np.asarray(step)
+
+
+def _evenly(system: ContactSystem, leg: Leg) -> FloatArray:
+    """Points of a leg with steps that are neither too large nor needlessly small."""
+    kept = [leg.points[0]]
+    for z in leg.points[1:-1]:
+        apart = float(np.abs(z - kept[-1]).max())
+        if apart >= _SMALLEST and float(np.abs(z - leg.points[-1]).max()) >= _SMALLEST:
+            kept.append(z)
+    if len(leg.points) > 1:
+        kept.append(leg.points[-1])
+    points = np.array(kept)
+    while True:
+        large = np.flatnonzero(_change(system, points) > _LARGEST)
+        if not len(large):
+            return points
+        middles = [_between(system, leg, points[i], points[i + 1]) for i in large]
+        points = np.insert(points, large + 1, middles, axis=0)
+
+
+def _between(
+    system: ContactSystem, leg: Leg, before: FloatArray, after: FloatArray
+) -> FloatArray:
+    """The point of a formation's manifold half way between two neighbours."""
+    pairs = leg.formation.array
+    gradients = gap_gradients(system, system.place(before[None]), pairs)[0]
+    rows = list(independent_rows(gradients))
+    basis = tangent_basis(gradients[rows])
+    middle = 0.5 * (before + after)
+    return project(system, pairs[rows], before, basis, middle[None]).points[0]
+
+
+def _torque_limits(
+    system: ContactSystem, model: ContactModel, leg: Leg, z: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Actuator torques that keep a leg's contacts, in N·m, each of shape (s, n)."""
+    gradients = gap_gradients(system, system.place(z), leg.formation.array)
+    lower, upper = model.torque_limits(gradients)
+    weight = system.link_weight_torques(z)
+    unit = system.force_unit * system.size
+    return (lower + weight) * unit, (upper + weight) * unit
+
+
+def _times(system: ContactSystem, joints: FloatArray) -> FloatArray:
+    """Times at which each step takes as long as its fastest joint needs, shape (f,), s."""
+    limits = np.array([joint.velocity_limit for joint in system.problem.hand.joints])
+    steps = (np.abs(np.diff(joints, axis=0)) / limits).max(axis=1, initial=0.0)
+    # A longer time than needed guards the limit against rounding.
+    return np.concatenate([[0.0], np.cumsum(np.maximum(steps * (1.0 + 1e-9), 1e-6))])
