@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfplan_core.contact.gaps import gaps
-from cfplan_core.contact.system import ContactSystem, IntArray, Placement
+from cfplan_core.contact.gaps import gaps, wedge_lifts
+from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 
 # Sine of the angle up to which a neighbouring edge may dip into the touched edge's body.
@@ -33,22 +33,13 @@ def touching(system: ContactSystem, z: FloatArray, tolerance: float) -> IntArray
     length = system.pair_length[everything]
     near = (np.abs(gap) <= tolerance) & (offset >= -tolerance) & (offset <= length + tolerance)
     candidates = np.flatnonzero(near)
-    return candidates[_wedge_clears(system, placed, candidates)]
-
-
-def _wedge_clears(system: ContactSystem, placed: Placement, pairs: IntArray) -> FloatArray:
-    """Tell for each pair whether both edges at the vertex leave the touched edge's body."""
-    vertex, edge = system.pair_vertex[pairs], system.pair_edge[pairs]
-    # An edge with outward normal m runs along i m; its component along a normal n is n · i m.
-    inward = placed.normals[0, edge].conj() * 1j
-    after = (inward * placed.normals[0, vertex]).real
-    before = -(inward * placed.normals[0, system.previous_vertex[vertex]]).real
-    return np.asarray((after >= -WEDGE_TOLERANCE) & (before >= -WEDGE_TOLERANCE))
+    behind, before = wedge_lifts(system, placed, candidates)
+    return candidates[(np.minimum(behind, before) >= -WEDGE_TOLERANCE)[0]]
 
 
 def coincident(
     system: ContactSystem, z: FloatArray, pairs: IntArray, tolerance: float
-) -> FloatArray:
+) -> BoolArray:
     """Tell which contacts between the same two bodies lie at the same place.
 
     Args:

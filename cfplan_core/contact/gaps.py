@@ -55,6 +55,37 @@ def offset_gradients(system: ContactSystem, placed: Placement, pairs: IntArray) 
     return _rates(system, placed, pairs, 1j * placed.normals[:, system.pair_edge[pairs]])
 
 
+def wedge_lifts(
+    system: ContactSystem, placed: Placement, pairs: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Sines of the angles between a touched edge and the edges at the vertex that touches it.
+
+    Returns:
+        For the edge behind and the edge before the vertex, each of shape (s, m): positive where
+        that edge leaves the touched one on its outside, zero where it lies flush.
+    """
+    vertex, edge = system.pair_vertex[pairs], system.pair_edge[pairs]
+    # An edge with outward normal m runs along i m; its component along a normal n is n · i m.
+    outward = placed.normals[:, edge].conj() * 1j
+    behind = outward * placed.normals[:, vertex]
+    before = outward * placed.normals[:, system.previous_vertex[vertex]]
+    return behind.real, -before.real
+
+
+def wedge_lift_gradients(
+    system: ContactSystem, placed: Placement, pairs: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Differentiate `wedge_lifts` by the configuration; each of shape (s, m, 3 + n)."""
+    vertex, edge = system.pair_vertex[pairs], system.pair_edge[pairs]
+    turn = np.zeros((len(pairs), system.dof))
+    turn[:, 2] = system.pair_object_sign[pairs]
+    turn[:, 3:] = system.pair_moves[pairs]
+    normal = placed.normals[:, edge].conj()
+    behind = (normal * placed.normals[:, vertex]).real
+    before = (normal * placed.normals[:, system.previous_vertex[vertex]]).real
+    return -behind[..., None] * turn, before[..., None] * turn
+
+
 def _rates(
     system: ContactSystem, placed: Placement, pairs: IntArray, direction: ComplexArray
 ) -> FloatArray:

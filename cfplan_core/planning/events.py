@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.gaps import gaps
+from cfplan_core.contact.gaps import gaps, wedge_lifts
 from cfplan_core.contact.system import ContactSystem, IntArray, Placement
 from cfplan_core.geometry.polygon import FloatArray
 
@@ -29,6 +29,8 @@ class EventKind(str, Enum):
 
     CONTACT = 'a gap closes'
     EDGE_END = 'a contact reaches the end of its edge'
+    FLUSH_AFTER = 'an edge behind a touching vertex comes to lie on an edge'
+    FLUSH_BEFORE = 'an edge before a touching vertex comes to lie on an edge'
     CLASS_CHANGE = 'the stability class changes'
     UNSTABLE = 'stability is lost'
     JOINT_LIMIT = 'a joint reaches its limit'
@@ -39,7 +41,15 @@ class EventKind(str, Enum):
 
 
 # Events behind which other contact formations may lie.
-OPEN_EVENTS = frozenset({EventKind.CONTACT, EventKind.EDGE_END, EventKind.CLASS_CHANGE})
+OPEN_EVENTS = frozenset(
+    {
+        EventKind.CONTACT,
+        EventKind.EDGE_END,
+        EventKind.FLUSH_AFTER,
+        EventKind.FLUSH_BEFORE,
+        EventKind.CLASS_CHANGE,
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -94,6 +104,7 @@ def sight(
     kept = formation.array
     found += _closing_gaps(system, gap, offset, kept, fresh)
     found += _edge_ends(system, offset[:, kept], kept)
+    found += _flush_edges(system, placed, kept)
     found += _joint_limits(system, z)
     grazing = _first_graze(system, gap, offset, kept)
     first = min((interval for interval, _ in found), default=len(z) - 1)
@@ -154,6 +165,24 @@ def _edge_ends(
                     Candidate(EventKind.EDGE_END, int(kept[k]), float(target[k]), float(fraction)),
                 )
             )
+    return found
+
+
+def _flush_edges(
+    system: ContactSystem, placed: Placement, kept: IntArray
+) -> list[tuple[int, Candidate]]:
+    """Edges beside a touching vertex that dip into the edge that it touches."""
+    found = []
+    kinds = (EventKind.FLUSH_AFTER, EventKind.FLUSH_BEFORE)
+    for kind, lift in zip(kinds, wedge_lifts(system, placed, kept), strict=True):
+        dips = (lift[:-1] > _NEAR) & (lift[1:] < -_NEAR)
+        if not dips.any():
+            continue
+        for k in np.flatnonzero(dips.any(axis=0)):
+            interval = int(np.argmax(dips[:, k]))
+            before, after = lift[interval, k], lift[interval + 1, k]
+            fraction = float(before / (before - after))
+            found.append((interval, Candidate(kind, int(kept[k]), 0.0, fraction)))
     return found
 
 

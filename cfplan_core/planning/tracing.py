@@ -15,8 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.gaps import gap_gradients, gaps, offset_gradients
-from cfplan_core.contact.system import ContactSystem, IntArray
+from cfplan_core.contact.gaps import (
+    gap_gradients,
+    gaps,
+    offset_gradients,
+    wedge_lift_gradients,
+    wedge_lifts,
+)
+from cfplan_core.contact.system import ContactSystem, IntArray, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Margins, Stability
 from cfplan_core.planning.events import Candidate, EventKind, sight
@@ -256,10 +262,10 @@ class _Pursuit:
         change = self._locate_class_change(samples[0], before, after, direction)
         if change is not None:
             located.append((along(change[0]), *change, -1))
-        tried: set[int] = set()
+        tried: set[tuple[EventKind, int]] = set()
         while candidates:
             for candidate in candidates:
-                tried.add(candidate.index)
+                tried.add((candidate.kind, candidate.index))
                 guess = before + candidate.fraction * (after - before)
                 z = self._locate(candidate, guess, samples[0], direction)
                 if z is None or not low - slack <= along(z) <= high + slack:
@@ -278,7 +284,7 @@ class _Pursuit:
             sighting = sight(
                 self.system, self.formation, both, self.system.place(both), self.fresh
             )
-            candidates = tuple(c for c in sighting.candidates if c.index not in tried)
+            candidates = tuple(c for c in sighting.candidates if (c.kind, c.index) not in tried)
         self._take(samples[1 : interval + 1])
         if not located:
             self._take(samples[interval + 1 : interval + 2])
@@ -305,23 +311,13 @@ class _Pursuit:
             across = across[:0]
         z = guess.copy()
         k = len(self.rows)
-        pair = np.array([max(candidate.index, 0)], dtype=np.intp)
         matrix = np.empty((system.dof, system.dof))
         residual = np.empty(system.dof)
         for _ in range(20):
             placed = system.place(z[None])
             matrix[:k] = gap_gradients(system, placed, self.rows)[0]
             residual[:k] = gaps(system, placed, self.rows).gap[0]
-            if candidate.kind is EventKind.JOINT_LIMIT:
-                matrix[k] = 0.0
-                matrix[k, 3 + candidate.index] = 1.0
-                residual[k] = z[3 + candidate.index] - candidate.target
-            elif candidate.kind is EventKind.EDGE_END:
-                matrix[k] = offset_gradients(system, placed, pair)[0, 0]
-                residual[k] = gaps(system, placed, pair).offset[0, 0] - candidate.target
-            else:
-                matrix[k] = gap_gradients(system, placed, pair)[0, 0]
-                residual[k] = gaps(system, placed, pair).gap[0, 0]
+            residual[k], matrix[k] = self._event(candidate, z, placed)
             matrix[k + 1 :] = across
             residual[k + 1 :] = across @ (z - origin)
             try:
@@ -346,15 +342,27 @@ class _Pursuit:
         offset = float(gaps(self.system, self.system.place(z[None]), pair).offset[0, 0])
         return -1e-9 <= offset <= float(self.system.pair_length[candidate.index]) + 1e-9
 
-    def _value(self, candidate: Candidate, z: FloatArray) -> float:
-        """Function whose root the event is, at z of shape (3 + n,)."""
+    def _event(
+        self, candidate: Candidate, z: FloatArray, placed: Placement
+    ) -> tuple[float, FloatArray]:
+        """Function whose root the event is and its gradient, at z of shape (3 + n,)."""
+        system = self.system
         if candidate.kind is EventKind.JOINT_LIMIT:
-            return float(z[3 + candidate.index]) - candidate.target
+            return float(z[3 + candidate.index]) - candidate.target, np.eye(system.dof)[
+                3 + candidate.index
+            ]
         pair = np.array([candidate.index], dtype=np.intp)
-        gap, offset = gaps(self.system, self.system.place(z[None]), pair)
-        if candidate.kind is EventKind.EDGE_END:
-            return float(offset[0, 0]) - candidate.target
-        return float(gap[0, 0])
+        if candidate.kind in (EventKind.FLUSH_AFTER, EventKind.FLUSH_BEFORE):
+            side = 0 if candidate.kind is EventKind.FLUSH_AFTER else 1
+            value = wedge_lifts(system, placed, pair)[side]
+            gradient = wedge_lift_gradients(system, placed, pair)[side]
+        elif candidate.kind is EventKind.EDGE_END:
+            value = gaps(system, placed, pair).offset - candidate.target
+            gradient = offset_gradients(system, placed, pair)
+        else:
+            value = gaps(system, placed, pair).gap
+            gradient = gap_gradients(system, placed, pair)
+        return float(value[0, 0]), gradient[0, 0]
 
     def _bracketed(
         self, candidate: Candidate, origin: FloatArray, before: FloatArray, after: FloatArray
@@ -366,7 +374,8 @@ class _Pursuit:
             return project(self.system, self.rows, origin, self.basis, guess[None]).points[0]
 
         def value(fraction: float) -> float:
-            return self._value(candidate, at(fraction))
+            z = at(fraction)
+            return self._event(candidate, z, self.system.place(z[None]))[0]
 
         if value(0.0) * value(1.0) >= 0.0:
             return after

@@ -109,7 +109,7 @@ def closure_margin(balance: Balance) -> float:
         equal=(np.column_stack([balance.wrenches, np.zeros(3)]), np.zeros(3)),
         at_most=(np.column_stack([-np.eye(count), np.ones(count)]), np.zeros(count)),
     )
-    return -optimum.value if optimum.found else 0.0
+    return max(0.0, -optimum.value) if optimum.found else 0.0
 
 
 def internal_force(balance: Balance) -> float:

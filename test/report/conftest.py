@@ -49,12 +49,12 @@ STRETCHES = (
     ((V0, V1, L3, R2), FORM, 0, -0.0176),
     ((V0, V1, L3, R2), FORCE, 0, None),
     ((V1, L0, L3, R2), FORCE, 2, None),
-    ((V1, L0, L3, RTIP), FORM, 2, None),
+    ((V1, L0, L3, RTIP), FORM, 2, -0.756405441),
     ((V1, L0, LTIP, RTIP), FORM, 2, None),
     ((V1, L0, LTIP, R3), FORCE, 2, None),
     ((V1, V2, L0, R3), FORCE, 0, -0.011123125),
 )
-CORNER_GUESSES = {2: -0.0562, 3: -0.293, 4: -0.755, 5: -0.93, 6: -1.13}
+CORNER_GUESSES = {2: -0.0562, 3: -0.293, 5: -0.93, 6: -1.13}
 
 
 def gaps(problem: Problem, contacts: Sequence[str], z: FloatArray) -> FloatArray:

@@ -56,10 +56,10 @@ def texts(figure: Figure) -> list[tuple[Text, Bbox]]:
 def drawn(text: Text, figure: Figure) -> bool:
     for axes in figure.axes:
         for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
-            for place, label in zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=True):
-                if label is text:
+            for tick in axis.get_major_ticks():
+                if text in (tick.label1, tick.label2):
                     margin = 1e-9 * (high - low)
-                    return bool(low - margin <= place <= high + margin and axes.axison)
+                    return bool(axes.axison and low - margin <= tick.get_loc() <= high + margin)
     return True
 
 
@@ -347,8 +347,7 @@ def test_finite_runs_are_longest_stretches() -> None:
 def test_numbers_of_short_segments_do_not_touch(problem: Problem, result: PlanResult) -> None:
     ends = [*range(0, 40, 1), 56]
     many = tuple(
-        Segment(result.segments[0].contacts, 'force_closure', a, b)
-        for a, b in pairwise(ends)
+        Segment(result.segments[0].contacts, 'force_closure', a, b) for a, b in pairwise(ends)
     )
     figure = torque_figure(problem, replace(result, segments=many))
     numbers = [(t, box) for t, box in texts(figure) if t.get_gid() == SEGMENT_LABEL]

@@ -1,0 +1,1 @@
+"""The ROS 2 side of cfplan: conversions and node around `cfplan_core`, without mechanics."""
