@@ -25,7 +25,7 @@ from cfplan_core.contact.gaps import (
 from cfplan_core.contact.system import ContactSystem, IntArray, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Margins, Stability
-from cfplan_core.planning.events import Candidate, EventKind, sight
+from cfplan_core.planning.events import Candidate, EventKind, Sighting, may_dip, sight
 from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
 
 # Margins below this count as lost: nothing is planned that is held by less.
@@ -198,6 +198,10 @@ class _Pursuit:
             if self.stability is Stability.UNSTABLE:
                 return self._finish(EventKind.UNSTABLE)
         changed = self._class_changes(margins)
+        if self.step > STEP / 100:
+            grazing = self._class_grazes(margins)
+            if grazing < min(changed, sighting.interval):
+                sighting = Sighting(grazing, (), True)
         if self.redundant:
             apart = np.abs(gaps(self.system, placed, self.contacts).gap).max(axis=1) > 1e-7
             if apart.any() and int(np.argmax(apart)) <= min(changed, sighting.interval):
@@ -241,6 +245,15 @@ class _Pursuit:
         form = margins.form_closure[1:] > STABILITY_MARGIN
         same = stable & (form == (self.stability is Stability.FORM_CLOSURE))
         return int(np.argmin(same)) if not same.all() else np.iinfo(int).max
+
+    def _class_grazes(self, margins: Margins) -> int:
+        """First interval beside a sample where the class may change and change back."""
+        form = margins.form_closure if self.stability is Stability.FORM_CLOSURE else (
+            -margins.form_closure
+        )
+        grazes = may_dip(margins.stable, STABILITY_MARGIN) | may_dip(form, STABILITY_MARGIN)
+        samples = np.flatnonzero(grazes)
+        return int(samples[0]) if len(samples) else np.iinfo(int).max
 
     def _end(
         self,

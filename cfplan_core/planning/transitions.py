@@ -34,7 +34,7 @@ class Departure:
     Attributes:
         formation: Contacts that are kept.
         direction: Unit tangent of the formation's curve, shape (3 + n,).
-        departing: Touching pairs that open.
+        departing: Touching pairs that open; not those at the place of a kept contact.
     """
 
     formation: Formation
@@ -150,6 +150,6 @@ def _leaving(
             failures['a contact would leave its edge'] += 1
             continue
         pairs = tuple(int(around.pairs[i]) for i in keep)
-        leaving = frozenset(int(around.pairs[i]) for i in others)
+        leaving = frozenset(int(around.pairs[i]) for i in opening)
         found.append(Departure(Formation(pairs), sign * tangent, leaving))
     return found

@@ -141,6 +141,23 @@ def test_other_hands_can_be_drawn_without_overlap(
         assert not overlaps(box, other), (a.get_text(), b.get_text())
 
 
+def test_long_names_do_not_overlap(three_joints: tuple[Problem, PlanResult]) -> None:
+    problem, plan = three_joints
+    index, thumb = problem.hand.fingers
+    joints = tuple(
+        replace(joint, name=f'right_index_finger_{joint.name}') for joint in index.joints
+    )
+    long = replace(index, name='right_index_finger_of_the_hand', joints=joints)
+    hand = replace(problem.hand, fingers=(long, thumb))
+    contact = 'object.v0|right_index_finger_of_the_hand.distal.e0'
+    segments = tuple(replace(segment, contacts=(contact,)) for segment in plan.segments)
+    renamed = replace(plan, joint_names=hand.joint_names, segments=segments)
+    for make in (grasps_figure, trajectory_figure, torque_figure):
+        figure = make(replace(problem, hand=hand), renamed)
+        for (a, box), (b, other) in combinations(texts(figure), 2):
+            assert not overlaps(box, other), (a.get_text(), b.get_text())
+
+
 def test_figure_3_lists_the_contacts_of_start_and_goal(
     problem: Problem, result: PlanResult
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -44,6 +45,15 @@ def axes_at(figure: Figure, left: float, bottom: float, width: float, height: fl
     """Add axes at a place given in inches from the figure's lower left corner."""
     across, up = figure.get_size_inches()
     return figure.add_axes((left / across, bottom / up, width / across, height / up))
+
+
+def text_widths(texts: Sequence[str]) -> list[float]:
+    """Widths of small texts, inches."""
+    figure = new_figure(1.0, 1.0)
+    canvas: Any = figure.canvas
+    renderer = canvas.get_renderer()
+    written = [figure.text(0.0, 0.0, text, fontsize=SMALL_FONT_SIZE) for text in texts]
+    return [text.get_window_extent(renderer).width / figure.dpi for text in written]
 
 
 def world_axes(

@@ -18,6 +18,7 @@ from cfplan_core.report.figures.drawing import (
     draw_contacts,
     figure_header,
     new_figure,
+    text_widths,
     world_axes,
 )
 from cfplan_core.report.figures.labels import Label, letter, place_labels, point_boxes
@@ -48,20 +49,22 @@ def grasps_figure(problem: Problem, result: PlanResult) -> Figure:
     panels = grasps_of(problem, result)
     view = view_of(problem, [grasp for _, grasp, _ in panels], margin=0.1)
     rows = max(len(contacts) for _, _, contacts in panels)
-    scene = _PANEL * view.height / view.width
+    columns = [_column_widths(contacts) for _, _, contacts in panels]
+    panel = max(_PANEL, *(sum(widths) + 0.2 * len(widths) for widths in columns))
+    scene = panel * view.height / view.width
     table = _ROW * (rows + 1) + 0.1 if rows else 0.0
-    width = 0.2 + len(panels) * (_PANEL + _GAP) - _GAP
+    width = 0.2 + len(panels) * (panel + _GAP) - _GAP
     figure = new_figure(width, 0.1 + table + 0.3 + scene + 0.3)
     for k, (title, grasp, contacts) in enumerate(panels):
-        left = 0.1 + k * (_PANEL + _GAP)
-        axes = world_axes(figure, left, 0.1 + table + 0.3, _PANEL, view)
+        left = 0.1 + k * (panel + _GAP)
+        axes = world_axes(figure, left, 0.1 + table + 0.3, panel, view)
         marks = contact_marks(problem, grasp, contacts)
         _draw_grasp(axes, problem, grasp, marks, view.width / 150.0)
         if k == 0:
             figure_header(figure, problem, axes, view)
         axes.set_xlabel(title, fontsize=FONT_SIZE + 1.0, color=INK, labelpad=4.0)
         if contacts:
-            _contact_table(axes_at(figure, left, 0.1, _PANEL, table), contacts, rows)
+            _draw_table(axes_at(figure, left, 0.1, panel, table), contacts, rows, panel)
     return figure
 
 
@@ -155,27 +158,39 @@ def inward_direction(vertices: FloatArray, k: int) -> FloatArray:
     return np.asarray(middle if turns_left else -middle)
 
 
-def _contact_table(axes: Axes, contacts: Sequence[str], rows: int) -> None:
-    """Write contacts as rows of the paper's Table 1, from the top of the axes."""
-    axes.set_axis_off()
-    axes.set_xlim(0.0, 1.0)
-    axes.set_ylim(rows + 1.0, 0.0)
-    columns = (0.05, 0.12, 0.40, 0.72)
-    header = ('', 'object element', 'body', 'hand element')
-    for x, text in zip(columns, header, strict=True):
-        axes.text(x, 0.5, text, fontsize=SMALL_FONT_SIZE, color=MUTED, va='center')
-    axes.plot([0.02, 0.98], [1.0, 1.0], color=FAINT, linewidth=0.6)
-    for row, name in enumerate(contacts):
+def _table_cells(contacts: Sequence[str]) -> list[tuple[str, str, str, str]]:
+    """Rows of the paper's Table 1, with the contacts' letters and a heading."""
+    cells = [('', 'object element', 'body', 'hand element')]
+    for k, name in enumerate(contacts):
         contact = parse_contact(name)
         on_object, on_hand = elements(contact)
-        cells = (letter(row).lower(), on_object, contact.body, on_hand)
-        for x, text in zip(columns, cells, strict=True):
+        cells.append((letter(k).lower(), on_object, contact.body, on_hand))
+    return cells
+
+
+def _column_widths(contacts: Sequence[str]) -> list[float]:
+    """Widths of the table's columns, inches."""
+    return [max(text_widths(column)) for column in zip(*_table_cells(contacts), strict=True)]
+
+
+def _draw_table(axes: Axes, contacts: Sequence[str], rows: int, width: float) -> None:
+    """Write the table from the top of axes of a width in inches and a height in rows."""
+    axes.set_axis_off()
+    axes.set_xlim(0.0, width)
+    axes.set_ylim(rows + 1.0, 0.0)
+    widths = _column_widths(contacts)
+    gap = min(0.3, (width - 0.2 - sum(widths)) / (len(widths) - 1))
+    axes.plot([0.05, width - 0.05], [1.0, 1.0], color=FAINT, linewidth=0.6)
+    for row, texts in enumerate(_table_cells(contacts)):
+        x = 0.1
+        for column, text in enumerate(texts):
             axes.text(
                 x,
-                row + 1.5,
+                row + 0.5,
                 text,
                 fontsize=SMALL_FONT_SIZE,
-                fontweight='bold' if x == columns[0] else 'normal',
-                color=INK,
+                fontweight='bold' if row and column == 0 else 'normal',
+                color=INK if row else MUTED,
                 va='center',
             )
+            x += widths[column] + gap

@@ -53,8 +53,7 @@ def renderer_of(axes: Axes) -> Any:
     Raises:
         TypeError: The figure is not drawn by Agg.
     """
-    figure = axes.get_figure(root=True)
-    canvas = None if figure is None else figure.canvas
+    canvas = axes.figure.canvas
     if not isinstance(canvas, FigureCanvasAgg):
         raise TypeError('the axes must be in a figure with a FigureCanvasAgg')
     return cast(Any, canvas).get_renderer()
@@ -134,9 +133,7 @@ def _extent(annotation: Annotation, renderer: Any) -> Bbox:
 
 def _pixels(axes: Axes) -> float:
     """Pixels in a point (1/72 inch)."""
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    return float(figure.dpi) / 72.0
+    return float(axes.figure.dpi) / 72.0
 
 
 def _offsets(

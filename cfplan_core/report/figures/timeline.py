@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from cfplan_core.report.figures.drawing import axes_at, new_figure
+from cfplan_core.report.figures.drawing import axes_at, new_figure, text_widths
 from cfplan_core.report.figures.labels import renderer_of
 from cfplan_core.report.style import (
     FAINT,
@@ -34,12 +34,13 @@ def timeline(result: PlanResult, panel: float) -> tuple[Figure, tuple[Axes, ...]
 
     Args:
         result: A solved one.
-        panel: Height of a panel, inches.
+        panel: Height of a panel, inches; more if a joint's name needs it.
 
     Returns:
         The figure and a panel per joint, whose time limits are final.
     """
     joints = len(result.joint_names)
+    panel = max(panel, *text_widths(result.joint_names))
     rows = _label_rows(result)
     strip = _STRIP * (max(rows, default=0) + 1)
     height = _BOTTOM + joints * (panel + _GAP) + strip + _TOP

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 
 from cfplan_core.contact.elements import ElementalContact, parse_contact
 from cfplan_core.model import Problem
-from cfplan_core.report.figures.drawing import axes_at, new_figure
-from cfplan_core.report.figures.labels import letter, renderer_of
+from cfplan_core.report.figures.drawing import text_widths
+from cfplan_core.report.figures.labels import letter
 from cfplan_core.report.figures.tree_layout import path_of
 from cfplan_core.report.figures.tree_nodes import PATH_RADIUS, Place, draw_meeting, draw_node
 from cfplan_core.report.scene import elements, short_body_names
@@ -47,7 +47,7 @@ def key_lines(problem: Problem, letters: Mapping[frozenset[str], str]) -> list[t
     for formation, name in letters.items():
         contacts = sorted(
             (parse_contact(contact) for contact in formation),
-            key=lambda c: (order.get(c.body, len(order)), c),
+            key=lambda c: (order.get(c.body, len(order)), c.body, elements(c)),
         )
         parts = [
             short.get(body, body) + ''.join(f' {_pair(contact)}' for contact in group)
@@ -62,10 +62,9 @@ def _pair(contact: ElementalContact) -> str:
     return '·'.join(word[0] + word.split()[1] for word in elements(contact))
 
 
-def key_columns(lines: Sequence[tuple[str, str]], width: float) -> int:
-    """Number of columns of a key that fit a width in inches; at least one."""
-    widest = max(text_widths([text for _, text in lines]), default=0.0)
-    return max(1, min(int(width / (widest + _LETTER_WIDTH + 0.2)), len(lines)))
+def key_width(lines: Sequence[tuple[str, str]]) -> float:
+    """Width that a column of a key needs, inches."""
+    return max(text_widths([text for _, text in lines])) + _LETTER_WIDTH + 0.2
 
 
 def write_key(
@@ -139,15 +138,3 @@ def draw_legend(axes: Axes, rows: Sequence[LegendRow], left: float, top: float) 
                 draw_node(axes, Place(x, y), node, '')
             axes.text(x + PATH_RADIUS + 0.08, y, label, color=INK, **words)
             x += width + 2.0 * PATH_RADIUS + 0.33
-
-
-def text_widths(texts: Sequence[str]) -> list[float]:
-    """Widths of small texts, inches."""
-    figure = new_figure(1.0, 1.0)
-    axes = axes_at(figure, 0.0, 0.0, 1.0, 1.0)
-    renderer = renderer_of(axes)
-    return [
-        axes.text(0.0, 0.0, text, fontsize=SMALL_FONT_SIZE).get_window_extent(renderer).width
-        / figure.dpi
-        for text in texts
-    ]

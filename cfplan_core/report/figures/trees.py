@@ -12,8 +12,8 @@ from cfplan_core.report.figures.tree_key import (
     LINE,
     draw_legend,
     formation_letters,
-    key_columns,
     key_lines,
+    key_width,
     legend_rows,
     write_key,
 )
@@ -50,15 +50,15 @@ def trees_figure(problem: Problem, result: PlanResult) -> Figure:
     deepest = [max((level for level, _ in layout), default=0) for layout in layouts]
     on_path = sum(len(path_of(tree)) - 1 for tree in result.trees if tree)
     levels = max(*deepest, on_path + _MEETING)
-    width = max(_PAGE, _LEVEL * levels + 2.0 * (PATH_RADIUS + _MARGIN))
-    inside = width - 2.0 * _MARGIN
+    key = key_lines(problem, letters)
+    inside = max(_PAGE - 2.0 * _MARGIN, _LEVEL * levels + 2.0 * PATH_RADIUS, key_width(key))
+    width = inside + 2.0 * _MARGIN
     pitch = min(_WIDEST_LEVEL, (inside - 2.0 * PATH_RADIUS) / levels)
     above, below = (
         max((row for _, row in layout), default=0.0) * _ROW + PATH_RADIUS + 0.1
         for layout in layouts
     )
-    key = key_lines(problem, letters)
-    columns = key_columns(key, inside)
+    columns = min(int(inside / key_width(key)), len(key))
     legend = legend_rows(result)
     key_height = LINE * (-(-len(key) // columns) + 1.0)
     spine = _MARGIN + key_height + 0.1 + _HEADER + below
