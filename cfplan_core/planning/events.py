@@ -36,6 +36,7 @@ class EventKind(str, Enum):
     JOINT_LIMIT = 'a joint reaches its limit'
     LINKS_MEET = 'two links meet'
     CLOSED = 'the curve closes'
+    FAR = 'the path is long enough'
     TARGET = 'the target is reached'
     LOST = 'the curve cannot be followed'
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,83 +20,10 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
 from cfplan_core.planning.events import OPEN_EVENTS
 from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
+from cfplan_core.planning.pieces import SAME, Junction, Piece
+from cfplan_core.planning.regions import Regions
 from cfplan_core.planning.tracing import STEP, Trace, Tracer, classify
-from cfplan_core.planning.transitions import Departure, Surroundings, departures, surroundings
-
-# Configurations nearer than this, in radians and object sizes, are the same.
-SAME = 1e-6
-
-
-@dataclass(eq=False)
-class Junction:
-    """A configuration where pieces meet.
-
-    Attributes:
-        around: What touches there.
-        formation: All contacts that touch.
-        stability: Of that formation; `UNSTABLE` if a vertex lies on a vertex.
-        isolated: True if that formation is a piece of its own: a point, stable.
-        ways: Ways out, found when first asked for.
-        taken: Piece behind each way out that was taken, None where it led nowhere.
-    """
-
-    around: Surroundings
-    formation: Formation
-    stability: Stability
-    isolated: bool
-    ways: list[Departure] | None = None
-    taken: dict[int, Piece | None] = field(default_factory=dict)
-    point: Piece | None = None
-
-    @property
-    def z(self) -> FloatArray:
-        """Configuration, shape (3 + n,)."""
-        return self.around.z
-
-
-@dataclass(eq=False)
-class Piece:
-    """A connected part of a contact formation within one stability class: a point or a curve.
-
-    Attributes:
-        index: Position in the roadmap.
-        formation: The contacts.
-        stability: The class.
-        dimension: 0 for a point, 1 for a curve.
-        points: Shape (s, 3 + n), along the curve.
-        ends: Junctions at the first and last point, None at a dead end.
-    """
-
-    index: int
-    formation: Formation
-    stability: Stability
-    dimension: int
-    points: FloatArray
-    ends: tuple[Junction | None, ...]
-
-    def path(self, start: FloatArray, end: FloatArray) -> FloatArray:
-        """Points from one configuration on the piece to another, shape (s, 3 + n)."""
-        if self.dimension == 0:
-            return start[None]
-        a, b = self._place(start), self._place(end)
-        low, high = min(a, b), max(a, b)
-        between = self.points[int(np.floor(low)) + 1 : int(np.ceil(high))]
-        if b < a:
-            between = between[::-1]
-        return np.concatenate([start[None], between, end[None]])
-
-    def _place(self, z: FloatArray) -> float:
-        """Where a configuration lies on the curve, in units of points."""
-        for place, end in ((0, self.points[0]), (len(self.points) - 1, self.points[-1])):
-            if np.abs(end - z).max() < SAME:
-                return float(place)
-        chord = np.diff(self.points, axis=0)
-        length = (chord**2).sum(axis=1)
-        fraction = ((z - self.points[:-1]) * chord).sum(axis=1) / np.where(length > 0, length, 1)
-        fraction = np.clip(fraction, 0.0, 1.0)
-        near = self.points[:-1] + fraction[:, None] * chord
-        interval = int(np.argmin(np.abs(near - z).max(axis=1)))
-        return interval + float(fraction[interval])
+from cfplan_core.planning.transitions import Departure, departures, surroundings
 
 
 class Roadmap:
@@ -107,6 +33,7 @@ class Roadmap:
         pieces: In the order in which they were found.
         failures: Why transitions failed, with how often.
         attempts: How many transitions were tried.
+        regions: Pieces of dimension two and more.
     """
 
     def __init__(
@@ -120,18 +47,18 @@ class Roadmap:
         Args:
             system: Compiled problem.
             model: Mechanics.
-            checkpoint: Called before every piece of work; may raise to interrupt.
+            checkpoint: Called before every stretch of work; may raise to interrupt.
         """
         self.system = system
         self.model = model
-        self.tracer = Tracer(system, model)
+        self.tracer = Tracer(system, model, checkpoint)
         self.pieces: list[Piece] = []
         self.failures: Counter[str] = Counter()
         self.attempts = 0
-        self._checkpoint = checkpoint
         self._junctions: list[Junction] = []
         self._cells: dict[tuple[int, ...], list[Junction]] = {}
         self._curves: dict[tuple[Formation, Stability], list[Piece]] = {}
+        self.regions = Regions(self)
 
     def formations(self) -> int:
         """Count the distinct contact formations that were met."""
@@ -140,17 +67,13 @@ class Roadmap:
         return len(known)
 
     def root(self, z: FloatArray) -> Piece:
-        """Return the piece that a stable configuration, shape (3 + n,), lies in.
-
-        Raises:
-            ValueError: The configuration's formation is of dimension two or more.
-        """
+        """Return the piece that a stable configuration, shape (3 + n,), lies inside."""
         junction = self.junction(z)
         if junction.isolated:
             return self._point(junction)
         rows = list(independent_rows(junction.around.gradients))
-        if self.system.dof - len(rows) != 1:
-            raise ValueError(f'formation of dimension {self.system.dof - len(rows)}')
+        if self.system.dof - len(rows) > 1:
+            return self.regions.around(junction.formation, z)
         known = self._on_curve(junction.formation, junction.stability, z)
         if known is not None:
             return known
@@ -163,19 +86,20 @@ class Roadmap:
         ends = (self._end(behind), self._end(ahead))
         return self._add_curve(junction.formation, junction.stability, points, ends)
 
-    def neighbours(self, piece: Piece) -> Iterator[tuple[Junction, Piece]]:
-        """Pieces next to a piece, each with the junction that lies between."""
+    def neighbours(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
+        """Points and curves next to a piece, each with the configuration that lies between."""
+        if piece.dimension > 1:
+            yield from self.regions.beyond(piece)
         for junction in dict.fromkeys(piece.ends):
             if junction is None:
                 continue
             if junction.isolated and piece.dimension > 0:
-                yield junction, self._point(junction)
+                yield junction.z, self._point(junction)
                 continue
             for way in range(len(self._ways(junction))):
-                self._checkpoint()
                 taken = self._take(junction, way)
                 if taken is not None and taken is not piece:
-                    yield junction, taken
+                    yield junction.z, taken
 
     def junction(self, z: FloatArray) -> Junction:
         """Return the junction at a configuration, shape (3 + n,), making it if it is new."""

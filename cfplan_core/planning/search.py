@@ -8,7 +8,7 @@ no path in the pieces explored.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +16,8 @@ import numpy as np
 from cfplan_core.contact.formation import Formation
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
-from cfplan_core.planning.roadmap import Junction, Piece, Roadmap
+from cfplan_core.planning.pieces import Piece
+from cfplan_core.planning.roadmap import Roadmap
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +42,13 @@ class Node:
     Attributes:
         piece: What the tree holds.
         parent: Index of the parent node, None for the root.
-        entry: The junction on the arc from the parent.
+        entry: Configuration where the arc from the parent enters, shape (3 + n,).
         depth: Number of arcs from the root.
     """
 
     piece: Piece
     parent: int | None
-    entry: Junction | None
+    entry: FloatArray | None
     depth: int
 
 
@@ -109,6 +110,7 @@ class Search:
         self.trees = (Tree(start), Tree(goal))
         self.meeting: int | None = None
         self._grown = grown
+        self._crossing = False
 
     def run(self) -> bool:
         """Grow until the trees join (true) or one of them is complete without it (false)."""
@@ -116,11 +118,26 @@ class Search:
             tree.frontier = [tree.add(Node(self.roadmap.root(tree.root), None, None, 0))]
         if self.trees[0].nodes[0].piece is self.trees[1].nodes[0].piece:
             self.meeting = self.trees[0].nodes[0].piece.index
+        self._alternate()
+        if self.meeting is None:
+            # Points and curves are exhausted: open contacts and cross regions.
+            self._crossing = True
+            for tree in self.trees:
+                tree.frontier = list(range(len(tree.nodes)))
+            self._alternate()
+        return self.meeting is not None
+
+    def _alternate(self) -> None:
+        """Grow the smaller tree until they join or one is complete."""
         while self.meeting is None and all(tree.frontier for tree in self.trees):
             initial, goal = self.trees
             smaller = 0 if len(initial.frontier) <= len(goal.frontier) else 1
             self._grow(self.trees[smaller], self.trees[1 - smaller])
-        return self.meeting is not None
+
+    def _neighbours(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
+        yield from self.roadmap.neighbours(piece)
+        if self._crossing:
+            yield from self.roadmap.regions.beside(piece)
 
     def _grow(self, tree: Tree, other: Tree) -> None:
         """Add a level to a tree; join at the common piece of least depth, if there is one."""
@@ -128,10 +145,10 @@ class Search:
         best: tuple[int, int] | None = None
         for index in tree.frontier:
             node = tree.nodes[index]
-            for junction, piece in self.roadmap.neighbours(node.piece):
+            for entry, piece in self._neighbours(node.piece):
                 if piece.index in tree.index_of:
                     continue
-                level.append(tree.add(Node(piece, index, junction, node.depth + 1)))
+                level.append(tree.add(Node(piece, index, entry, node.depth + 1)))
                 if piece.index in other.index_of:
                     depth = node.depth + 1 + other.nodes[other.index_of[piece.index]].depth
                     best = min(best or (depth, piece.index), (depth, piece.index))
@@ -149,8 +166,8 @@ class Search:
         initial, goal = (tree.chain(tree.index_of[self.meeting]) for tree in self.trees)
         pieces = [node.piece for node in initial] + [node.piece for node in goal[-2::-1]]
         stops = [self.trees[0].root]
-        stops += [node.entry.z for node in initial if node.entry is not None]
-        stops += [node.entry.z for node in reversed(goal) if node.entry is not None]
+        stops += [node.entry for node in initial if node.entry is not None]
+        stops += [node.entry for node in reversed(goal) if node.entry is not None]
         stops.append(self.trees[1].root)
         legs = []
         for piece, begin, end in zip(pieces, stops[:-1], stops[1:], strict=True):

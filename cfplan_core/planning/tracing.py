@@ -34,10 +34,11 @@ STABILITY_MARGIN = 1e-6
 STEP = 0.04
 _STRETCH = 10
 _SMALLEST_STEP = 1e-7
+LONGEST = 100.0
 _LOCATED = 1e-11
 
-# Chooses the direction of motion from a configuration and the tangent basis there: a unit vector
-# in the span of the basis, or None where there is nowhere left to go.
+# Chooses the motion from a configuration and the tangent basis there: a vector in the span of the
+# basis, beyond whose length it is asked again, or None where there is nowhere left to go.
 Steering = Callable[[FloatArray, FloatArray], 'FloatArray | None']
 
 
@@ -49,7 +50,6 @@ class Trace:
         points: Shape (s, 3 + n), from the start to the event, both included.
         kind: What ended it.
         pairs: The pairs that closed or reached their edge's end; a joint's index for a limit.
-        length: Largest coordinate change added up over the steps.
     """
 
     points: FloatArray
@@ -81,9 +81,22 @@ def classify(margins: Margins) -> Stability:
 class Tracer:
     """Follows curves of one system under one contact model."""
 
-    def __init__(self, system: ContactSystem, model: ContactModel) -> None:
+    def __init__(
+        self,
+        system: ContactSystem,
+        model: ContactModel,
+        checkpoint: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            system: Compiled problem.
+            model: Judges stability.
+            checkpoint: Called before every stretch; may raise to interrupt.
+        """
         self.system = system
         self.model = model
+        self.checkpoint = checkpoint
 
     def margins(self, formation: Formation, z: FloatArray) -> Margins:
         """Stability margins of a formation at configurations of shape (s, 3 + n)."""
@@ -99,7 +112,7 @@ class Tracer:
         start: FloatArray,
         steer: Steering,
         departing: frozenset[int] = frozenset(),
-        longest: float = 100.0,
+        longest: float = LONGEST,
     ) -> Trace:
         """Follow a formation until an event.
 
@@ -108,7 +121,7 @@ class Tracer:
             start: Configuration on its manifold, shape (3 + n,).
             steer: Chooses the direction at the beginning of every stretch.
             departing: Other pairs that touch at the start and open.
-            longest: Stop with `EventKind.LOST` after this length.
+            longest: Stop with `EventKind.FAR` after this length.
         """
         return _Pursuit(self, formation, start, steer, departing, longest).run()
 
@@ -127,6 +140,7 @@ class _Pursuit:
     ) -> None:
         self.system = tracer.system
         self.model = tracer.model
+        self.checkpoint = tracer.checkpoint
         self._gradients = tracer.gradients
         self.formation = formation
         self.contacts = formation.array
@@ -148,6 +162,7 @@ class _Pursuit:
         z = self.start
         length = 0.0
         while length < self.longest:
+            self.checkpoint()
             direction = self.steer(z, self.basis)
             if direction is None:
                 return self._finish(EventKind.TARGET)
@@ -157,9 +172,15 @@ class _Pursuit:
             ended = self._advance(samples, direction)
             if ended is not None:
                 return ended
+            if length > 4.0 * STEP and self._returned(self.points[-1]):
+                return self._finish(EventKind.CLOSED)
             z = self.points[-1][-1]
             length += float(np.abs(z - samples[0]).max())
-        return self._finish(EventKind.LOST)
+        return self._finish(EventKind.FAR)
+
+    def _returned(self, samples: FloatArray) -> bool:
+        """Tell whether a closed curve has come back to its start."""
+        return bool(np.abs(samples - self.start).max(axis=1).min() < 0.75 * STEP)
 
     def _finish(self, kind: EventKind, pairs: tuple[int, ...] = ()) -> Trace:
         return Trace(np.concatenate(self.points), kind, pairs)
@@ -167,7 +188,9 @@ class _Pursuit:
     def _stretch(self, z: FloatArray, direction: FloatArray) -> FloatArray | None:
         """Points ahead along a direction, shape (s, 3 + n), z first; None if there are none."""
         while self.step > _SMALLEST_STEP:
-            steps = np.arange(1, _STRETCH + 1) * (self.step / np.abs(direction).max())
+            reach = float(np.abs(direction).max())
+            count = min(_STRETCH, max(1, int(np.ceil(reach / self.step))))
+            steps = np.arange(1, count + 1) * min(self.step / reach, 1.0 / count)
             if self.fresh:
                 # A short first step shows what holds just behind the start.
                 steps = np.concatenate([[0.02 * steps[0]], steps])
@@ -177,11 +200,11 @@ class _Pursuit:
             samples = np.concatenate([z[None], found.points])
             change = np.abs(np.diff(samples, axis=0)).max(axis=1)
             smooth = found.converged & (change < 1.5 * self.step)
-            count = int(np.argmin(smooth)) if not smooth.all() else len(smooth)
-            if count > (1 if self.fresh else 0):
-                if count < len(smooth):
+            good = int(np.argmin(smooth)) if not smooth.all() else len(smooth)
+            if good > (1 if self.fresh else 0):
+                if good < len(smooth):
                     self.step *= 0.5
-                return samples[: count + 1]
+                return samples[: good + 1]
             self.step *= 0.25
         return None
 

@@ -68,6 +68,11 @@ class Surroundings:
         """True if a vertex lies on a vertex."""
         return bool(self.together.any())
 
+    def keeps_vertex(self, pairs: tuple[int, ...]) -> bool:
+        """True if two of some touching contacts lie at one place."""
+        chosen = np.isin(self.pairs, pairs)
+        return bool(self.together[np.ix_(chosen, chosen)].any())
+
 
 def surroundings(system: ContactSystem, z: FloatArray) -> Surroundings:
     """Detect what touches at z, shape (3 + n,)."""

@@ -377,3 +377,18 @@ def test_a_malformed_contact_is_refused(problem: Problem, result: PlanResult) ->
     segments = (replace(result.segments[0], contacts=('nonsense',)), *result.segments[1:])
     with pytest.raises(CfplanError, match='nonsense'):
         frames_figure(problem, replace(result, segments=segments))
+
+
+def test_a_number_that_does_not_fit_its_segment_is_above_it(
+    problem: Problem, result: PlanResult
+) -> None:
+    narrow = (
+        replace(result.segments[0], first_frame=0, last_frame=21),
+        replace(result.segments[0], first_frame=21, last_frame=22),
+        replace(result.segments[0], first_frame=22, last_frame=56),
+    )
+    times = result.times.copy()
+    times[21] = times[22] - 1e-3
+    figure = torque_figure(problem, replace(result, segments=narrow, times=times))
+    heights = {t.get_text(): t.get_position()[1] for t in figure.findobj(Text) if t.get_gid()}
+    assert heights == {'1': 0.5, '2': 1.5, '3': 0.5}

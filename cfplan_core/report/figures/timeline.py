@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import count
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -78,18 +79,18 @@ def style_axes(axes: Axes) -> None:
 
 
 def _label_rows(result: PlanResult) -> list[int]:
-    """Row of every segment's number, so that the numbers of short segments do not touch."""
+    """Row of every segment's number: 0 if it fits into its box, else the first free one above."""
     first, last = time_limits(result)
     across = (_PAGE - _LEFT - _RIGHT) / (last - first)
-    ends: list[float] = []
+    taken_to: dict[int, float] = {}
     rows = []
     for k, segment in enumerate(result.segments):
-        middle = (
-            across * (result.times[segment.first_frame] + result.times[segment.last_frame]) / 2
-        )
-        half = 0.06 * len(str(k + 1)) + 0.03
-        row = next((r for r, end in enumerate(ends) if middle - half > end), len(ends))
-        ends[row : row + 1] = [middle + half]
+        start, end = result.times[[segment.first_frame, segment.last_frame]]
+        middle = across * (start + end) / 2.0
+        half = 0.06 * len(str(k + 1)) + 0.02
+        fits = across * (end - start) > 2.0 * half
+        row = next(r for r in count(0 if fits else 1) if taken_to.get(r, -np.inf) <= middle - half)
+        taken_to[row] = middle + half
         rows.append(row)
     return rows
 

@@ -1,0 +1,241 @@
+"""Contact formations of dimension two and more, explored along rays.
+
+A region is entered from a curve by opening one of its contacts, or at a start or goal inside it.
+From its anchor rays are followed, straight within the manifold, to the events that end them; each
+leads to a neighbouring piece. Two entries belong to the same region if a straight path within the
+formation joins their anchors. Rays see what can be seen from the anchors: exploration is complete
+for points and curves, and only that far for regions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfplan_core.contact.formation import Formation
+from cfplan_core.contact.gaps import gap_gradients
+from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.contact_model import Stability
+from cfplan_core.planning.events import OPEN_EVENTS, EventKind
+from cfplan_core.planning.manifold import independent_rows, tangent_basis
+from cfplan_core.planning.pieces import Piece, Region
+from cfplan_core.planning.tracing import STABILITY_MARGIN, Trace, classify
+
+if TYPE_CHECKING:
+    from cfplan_core.planning.roadmap import Roadmap
+
+# Rays from an anchor: directions in the plane for dimension two, as many for each further one.
+_RAYS = 12
+# How far, in radians and object sizes, an entry is followed to find an anchor.
+_DEPTH = 0.4
+# Anchors of one formation and class that no straight path joins: more are not kept apart.
+_MOST_REGIONS = 6
+_ARRIVED = 1e-9
+
+
+class Regions:
+    """Regions of a roadmap."""
+
+    def __init__(self, roadmap: Roadmap) -> None:
+        """Start empty."""
+        self._roadmap = roadmap
+        self._known: dict[tuple[Formation, Stability], list[Region]] = {}
+        self._beyond: dict[int, list[tuple[FloatArray, Piece]]] = {}
+        self._beside: dict[int, list[tuple[FloatArray, Piece]]] = {}
+
+    def around(self, formation: Formation, z: FloatArray) -> Region:
+        """Return the region of a formation that a stable configuration lies inside."""
+        region = self._merge(formation, z, z[None])
+        assert region is not None, 'a configuration inside a region is no entry to be dropped'
+        return region
+
+    def beside(self, piece: Piece) -> list[tuple[FloatArray, Piece]]:
+        """Regions that a piece borders on: those where one of its contacts opens."""
+        if piece.index not in self._beside:
+            self._beside[piece.index] = list(self._openings(piece))
+        return self._beside[piece.index]
+
+    def beyond(self, piece: Piece) -> list[tuple[FloatArray, Piece]]:
+        """Pieces that rays from a region's anchor lead to, with where they enter them."""
+        if piece.index not in self._beyond:
+            assert isinstance(piece, Region)
+            self._beyond[piece.index] = list(self._shoot(piece))
+        return self._beyond[piece.index]
+
+    def _openings(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
+        tracer = self._roadmap.tracer
+        for pair in piece.formation.pairs:
+            rest = Formation(tuple(p for p in piece.formation.pairs if p != pair))
+            if len(rest) < 3:
+                continue
+            holds = tracer.margins(rest, piece.points).stable > STABILITY_MARGIN
+            for middle in _middles(holds):
+                z = piece.points[middle]
+                heading = self._opening(rest, pair, z)
+                if heading is None:
+                    continue
+                region = self._enter(rest, z, heading, frozenset({pair}))
+                if region is not None:
+                    yield z, region
+
+    def _opening(self, rest: Formation, pair: int, z: FloatArray) -> FloatArray | None:
+        """Direction in which a gap opens fastest while the other contacts are kept."""
+        pairs = np.array([*rest.pairs, pair], dtype=np.intp)
+        gradients = self._roadmap.tracer.gradients(z[None], pairs)[0]
+        rows = list(independent_rows(gradients[:-1]))
+        basis = tangent_basis(gradients[rows])
+        if len(basis) < 2:
+            return None
+        slope = basis @ gradients[-1]
+        steepness = float(np.linalg.norm(slope))
+        return None if steepness < STABILITY_MARGIN else slope @ basis / steepness
+
+    def _enter(
+        self,
+        formation: Formation,
+        z: FloatArray,
+        heading: FloatArray,
+        departing: frozenset[int],
+    ) -> Region | None:
+        """Follow a heading into a region and return it; None if it ends at once."""
+        trace = self._ray(formation, z, heading, departing, _DEPTH)
+        self._roadmap.attempts += 1
+        if len(trace.points) < 3:
+            self._roadmap.failures[f'at once, {trace.kind.value}'] += 1
+            return None
+        return self._merge(formation, z, trace.points[: len(trace.points) // 2 + 1])
+
+    def _merge(self, formation: Formation, z: FloatArray, inward: FloatArray) -> Region | None:
+        """Find or make the region that points from z lead into."""
+        roadmap = self._roadmap
+        anchor = inward[-1]
+        stability = classify(roadmap.tracer.margins(formation, anchor[None]))
+        known = self._known.setdefault((formation, stability), [])
+        for region in known:
+            joining = self._straight(formation, anchor, region.anchor)
+            if joining is not None:
+                region.links.append((z, np.concatenate([joining[::-1], inward[-2::-1]])))
+                return region
+        if len(known) >= _MOST_REGIONS:
+            roadmap.failures['too many regions of one formation'] += 1
+            return None
+        gradients = roadmap.tracer.gradients(anchor[None], formation.array)[0]
+        region = Region(
+            len(roadmap.pieces),
+            formation,
+            stability,
+            roadmap.system.dof - len(independent_rows(gradients)),
+            anchor[None],
+            (),
+            [(z, inward[::-1])],
+        )
+        roadmap.pieces.append(region)
+        known.append(region)
+        return region
+
+    def _straight(
+        self, formation: Formation, start: FloatArray, end: FloatArray
+    ) -> FloatArray | None:
+        """Points of the path from start to end projected onto the manifold, if it gets there."""
+
+        def steer(z: FloatArray, basis: FloatArray) -> FloatArray | None:
+            ahead = np.asarray(basis.T @ (basis @ (end - z)))
+            return ahead if np.abs(ahead).max() > _ARRIVED else None
+
+        if np.abs(end - start).max() <= _ARRIVED:
+            return start[None]
+        trace = self._roadmap.tracer.follow(
+            formation, start, steer, longest=4.0 * float(np.abs(end - start).max())
+        )
+        if trace.kind is not EventKind.TARGET or np.abs(trace.end - end).max() > 1e-6:
+            return None
+        return np.concatenate([trace.points[:-1], end[None]])
+
+    def _ray(
+        self,
+        formation: Formation,
+        z: FloatArray,
+        heading: FloatArray,
+        departing: frozenset[int],
+        longest: float,
+    ) -> Trace:
+        """Follow a heading, kept as straight as the manifold allows."""
+
+        def steer(_: FloatArray, basis: FloatArray) -> FloatArray | None:
+            nonlocal heading
+            ahead = basis.T @ (basis @ heading)
+            length = float(np.linalg.norm(ahead))
+            if length < 0.1:
+                return None
+            heading = ahead / length
+            return heading
+
+        return self._roadmap.tracer.follow(formation, z, steer, departing, longest)
+
+    def _shoot(self, region: Region) -> Iterator[tuple[FloatArray, Piece]]:
+        roadmap = self._roadmap
+        gradients = roadmap.tracer.gradients(region.points, region.formation.array)[0]
+        basis = tangent_basis(gradients[list(independent_rows(gradients))])
+        for direction in _directions(len(basis)):
+            trace = self._ray(
+                region.formation, region.anchor, direction @ basis, frozenset(), np.pi
+            )
+            roadmap.attempts += 1
+            if trace.kind not in OPEN_EVENTS or len(trace.points) < 2:
+                roadmap.failures[trace.kind.value] += 1
+                continue
+            region.links.append((trace.end, trace.points))
+            heading = trace.points[-1] - trace.points[-2]
+            for piece in self._entered(region, trace.end, heading):
+                yield trace.end, piece
+
+    def _entered(
+        self, region: Region, z: FloatArray, heading: FloatArray
+    ) -> Iterator[Piece]:
+        """Pieces that a ray of a region runs into at an event."""
+        roadmap = self._roadmap
+        junction = roadmap.junction(z)
+        if junction.stability is not Stability.UNSTABLE and (
+            junction.formation != region.formation
+        ):
+            yield roadmap.root(z)
+            return
+        for formation in _alternatives(junction.formation, region.formation):
+            if junction.around.keeps_vertex(formation.pairs):
+                continue
+            gradients = gap_gradients(
+                roadmap.system, roadmap.system.place(z[None]), formation.array
+            )
+            if not roadmap.model.margins(gradients).stable[0] > STABILITY_MARGIN:
+                continue
+            entered = self._enter(formation, z, heading, frozenset())
+            if entered is not None and entered is not region:
+                yield entered
+
+
+def _middles(holds: FloatArray) -> list[int]:
+    """Middle index of every run of true values."""
+    bounds = np.flatnonzero(np.diff(np.concatenate([[0], holds.astype(int), [0]])))
+    return [int(a + b - 1) // 2 for a, b in zip(bounds[::2], bounds[1::2], strict=True)]
+
+
+def _alternatives(touching: Formation, kept: Formation) -> list[Formation]:
+    """Formations of as many touching contacts as are kept that differ in one of them at most."""
+    new = [pair for pair in touching.pairs if pair not in kept]
+    swapped = [
+        Formation(tuple(sorted(pair if p == old else p for p in kept.pairs)))
+        for old in kept.pairs
+        for pair in new
+    ]
+    return [kept, *swapped]
+
+
+def _directions(dimension: int) -> FloatArray:
+    """Unit vectors spread over a sphere, shape (k, dimension); the same on every call."""
+    if dimension == 2:
+        angles = np.arange(_RAYS) * (2.0 * np.pi / _RAYS)
+        return np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    spread = np.random.default_rng(0).normal(size=(_RAYS * (dimension - 1), dimension))
+    return np.asarray(spread / np.linalg.norm(spread, axis=1, keepdims=True))
