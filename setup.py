@@ -42,8 +42,8 @@ setup(
     python_requires='>=3.10',
     install_requires=[
         'click>=8.1',
-        'jsonschema>=4.18',
-        'matplotlib>=3.8',
+        'jsonschema>=4.10',
+        'matplotlib>=3.10',
         'numpy>=1.26',
         'pillow>=10.0',
         'pyyaml>=6.0',

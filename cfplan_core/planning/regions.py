@@ -188,6 +188,7 @@ class Regions:
                 continue
             region.links.append((trace.end, trace.points))
             heading = trace.points[-1] - trace.points[-2]
+            heading = heading / np.linalg.norm(heading)
             for piece in self._entered(region, trace.end, heading):
                 yield trace.end, piece
 

@@ -292,8 +292,6 @@ class _Pursuit:
         def along(z: FloatArray) -> float:
             return float((z - samples[0]) @ unit)
 
-        low, high = along(before), along(after)
-        slack = 1e-6 + 0.01 * (high - low)
         located: list[tuple[float, FloatArray, EventKind, int]] = []
         change = self._locate_class_change(samples[0], before, after, direction)
         if change is not None:
@@ -302,20 +300,13 @@ class _Pursuit:
         while candidates:
             for candidate in candidates:
                 tried.add((candidate.kind, candidate.index))
-                guess = before + candidate.fraction * (after - before)
-                z = self._locate(candidate, guess, samples[0], direction)
-                if z is None or not low - slack <= along(z) <= high + slack:
-                    # Newton's method ran to another root: start it inside a bracket.
-                    guess = self._bracketed(candidate, samples[0], before, after)
-                    z = self._locate(candidate, guess, samples[0], direction)
-                if z is None or not low - slack <= along(z) <= high + slack:
-                    continue
-                if self._happens(candidate, z):
+                z = self._find(candidate, samples[0], before, after, direction)
+                if z is not None and self._happens(candidate, z):
                     located.append((along(z), z, candidate.kind, candidate.index))
             if not located:
                 break
             # A gap may have closed and, where its vertex left the edge, opened within the interval.
-            high, after, _, _ = min(located, key=lambda item: item[0])
+            _, after, _, _ = min(located, key=lambda item: item[0])
             both = np.stack([before, after])
             sighting = sight(
                 self.system, self.formation, both, self.system.place(both), self.fresh
@@ -330,7 +321,7 @@ class _Pursuit:
         self._take(z[None])
         return self._finish(kind, together)
 
-    def _locate(
+    def _newton(
         self,
         candidate: Candidate,
         guess: FloatArray,
@@ -400,10 +391,27 @@ class _Pursuit:
             gradient = gap_gradients(system, placed, pair)
         return float(value[0, 0]), gradient[0, 0]
 
-    def _bracketed(
-        self, candidate: Candidate, origin: FloatArray, before: FloatArray, after: FloatArray
-    ) -> FloatArray:
-        """Brent's method between two points; the second one if the function has no sign change."""
+    def _find(
+        self,
+        candidate: Candidate,
+        origin: FloatArray,
+        before: FloatArray,
+        after: FloatArray,
+        direction: FloatArray,
+    ) -> FloatArray | None:
+        """Locate an event between two points, or return None if it is not between them."""
+
+        def between(z: FloatArray | None) -> bool:
+            if z is None:
+                return False
+            low, at, high = (float(v @ direction) for v in (before, z, after))
+            slack = 1e-6 + 0.01 * (high - low)
+            return low - slack <= at <= high + slack
+
+        z = self._newton(candidate, before + candidate.fraction * (after - before), origin, direction)
+        if between(z):
+            return z
+        # Another root, or contacts that become dependent just there: enclose it.
 
         def at(fraction: float) -> FloatArray:
             guess = before + fraction * (after - before)
@@ -414,8 +422,10 @@ class _Pursuit:
             return self._event(candidate, z, self.system.place(z[None]))[0]
 
         if value(0.0) * value(1.0) >= 0.0:
-            return after
-        return at(root(value))
+            return None
+        enclosed = at(root(value))
+        z = self._newton(candidate, enclosed, origin, direction)
+        return z if between(z) else enclosed
 
     def _locate_class_change(
         self, origin: FloatArray, before: FloatArray, after: FloatArray, direction: FloatArray
