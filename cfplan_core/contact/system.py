@@ -1,10 +1,10 @@
 """Hand and object compiled into flat arrays, without units, for the mathematics above.
 
 Lengths are in units of the object's size and forces in units of its weight (1 N without gravity),
-so that metres and radians can be compared. Points of the plane are complex numbers x + iy, so that a
-rotation is a product. A configuration is z = (x, y, φ, θ_1 … θ_n): position
-and angle of the frame in the object's centre of mass, parallel to the object's frame, then the
-joint angles. Functions take batches of configurations, shape (s, 3 + n).
+so that metres and radians can be compared. Points of the plane are complex numbers x + iy, so
+that a rotation is a product. A configuration is z = (x, y, φ, θ_1 … θ_n): position and angle of
+the frame in the object's centre of mass, parallel to the object's frame, then the joint angles.
+Functions take batches of configurations, shape (s, 3 + n).
 
 All vertices of all bodies stand in one list, the object's first; edge k starts at vertex k. A
 *pair* is a vertex of one body and an edge of another; the first `contact_count` pairs are the

@@ -36,7 +36,8 @@ def span_margin(vectors: FloatArray) -> FloatArray:
     Returns:
         Shape (s,): over all planes through two of the vectors, the smallest distance to which the
         others reach on the plane's emptier side. Positive if and only if the vectors positively
-        span R³, and continuous in the vectors; -1 for fewer than four vectors or rank below two.
+        span R³. Continuous in the vectors but where two become parallel: there it may jump,
+        between values of one sign. -1 for fewer than four vectors or rank below two.
     """
     count = vectors.shape[1]
     if count < 4:

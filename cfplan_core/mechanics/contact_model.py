@@ -22,7 +22,10 @@ class Stability(str, Enum):
 
 
 class Margins(NamedTuple):
-    """Continuous functions, each of shape (s,), that are positive where a property holds.
+    """Functions of the configuration, each of shape (s,), positive where a property holds.
+
+    They may be followed to the place where they change their sign, and form closure is never
+    without stability.
 
     Attributes:
         stable: First-order stability (force or form closure).
@@ -39,7 +42,7 @@ class Motion(NamedTuple):
     Attributes:
         object_velocity: Shape (3,), rate of (x, y, φ) of the centre of mass.
         gap_rates: Shape (k,), zero for contacts that are kept, positive for those that break.
-        unique: False if other object velocities are as good.
+        unique: False if other object velocities, however near, are as good.
     """
 
     object_velocity: FloatArray
@@ -60,13 +63,18 @@ class ContactModel(Protocol):
     def torque_limits(self, gradients: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Lower and upper actuator torques that keep all contacts, each of shape (s, n).
 
-        Infinite where unbounded, NaN where no equilibrium exists. The links' weight is not
+        Infinite where unbounded; NaN where no equilibrium exists or the wrenches have a rank
+        below 3, so that the contacts alone do not hold the object. The links' weight is not
         included.
         """
 
     def motion(self, gradients: FloatArray, joint_velocity: FloatArray) -> Motion:
         """Predict the object's velocity; `gradients` of shape (k, 3 + n), velocity (n,).
 
+        Meaningful where the contacts can balance the load: without an equilibrium the object
+        falls ever faster, and what is returned is only one of the velocities possible.
+
         Raises:
-            JammedError: No object velocity keeps every gap non-negative.
+            JammedError: No object velocity keeps every gap non-negative, or the wrenches have a
+                rank below 3 and do not determine the motion.
         """

@@ -62,7 +62,9 @@ class FrictionlessModel:
         if not self.load.any():
             return Margins(form_closure, form_closure)
         load = np.broadcast_to(self.load, (len(wrenches), 1, 3))
-        return Margins(span_margin(np.concatenate([wrenches, load], axis=1)), form_closure)
+        stable = span_margin(np.concatenate([wrenches, load], axis=1))
+        # Both are positive in form closure, but the load may make the margin smaller.
+        return Margins(np.maximum(stable, form_closure), form_closure)
 
     def torque_limits(self, gradients: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Minimum and maximum of τ_j over {c ≥ 0, W c = −f}, over its vertices and rays."""
@@ -125,23 +127,25 @@ class FrictionlessModel:
             )
         target = -drive[triples[regular]]
         velocity = (
-            target[:, :1] * bc[regular] + target[:, 1:2] * ca[regular] + target[:, 2:] * ab[regular]
+            target[:, :1] * bc[regular]
+            + target[:, 1:2] * ca[regular]
+            + target[:, 2:] * ab[regular]
         ) / determinant[regular, None]
         rates = velocity @ w.T + drive
-        scale = 1.0 + np.abs(velocity).max(axis=1)
-        feasible = rates.min(axis=1) >= -_NEGATIVE * scale
+        tolerance = _NEGATIVE * (1.0 + np.abs(velocity).max(axis=1))
+        feasible = rates.min(axis=1) >= -tolerance
         if not feasible.any():
             raise JammedError(
                 f'no object velocity keeps all {len(w)} gaps open at joint velocity '
                 f'{np.array2string(joint_velocity, precision=4)}: the grasp jams'
             )
-        velocity, rates = velocity[feasible], rates[feasible]
-        fall = velocity @ self.load
-        best = int(np.argmax(fall))
-        ties = fall >= fall[best] - _NEGATIVE * (1.0 + abs(fall[best]))
-        spread = np.abs(velocity[ties] - velocity[best]).max()
+        best = np.flatnonzero(feasible)[np.argmax(velocity[feasible] @ self.load)]
+        kept = rates[best] <= tolerance[best]
+        # Any other velocity as good differs by a direction that opens no kept gap below zero and
+        # does not climb: there is none if and only if these wrenches and the load span.
+        restraints = np.concatenate([w[kept], self.load[None]])
         return Motion(
             velocity[best],
-            np.where(np.abs(rates[best]) < _NEGATIVE, 0.0, rates[best]),
-            bool(spread <= _NEGATIVE * (1.0 + np.abs(velocity[best]).max())),
+            np.where(kept, 0.0, rates[best]),
+            bool(span_margin(restraints[None])[0] > _NEGATIVE),
         )

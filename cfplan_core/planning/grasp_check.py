@@ -84,7 +84,9 @@ def check_problem(problem: Problem, file: str = '<problem>') -> tuple[Finding, .
     findings = []
     if problem.friction > 0.0:
         findings.append(
-            Finding(file, 'contact.friction', f'{problem.friction:g}', '0.0: contacts without friction')
+            Finding(
+                file, 'contact.friction', f'{problem.friction:g}', '0.0: contacts without friction'
+            )
         )
     system = ContactSystem(problem)
     model = FrictionlessModel(system.load)
@@ -157,7 +159,9 @@ def _near_misses(system: ContactSystem, z: FloatArray, pairs: IntArray) -> str:
     """Name the contacts that nearly touch."""
     everything = np.arange(system.contact_count)
     gap, offset = (values[0] for values in gaps(system, system.place(z[None]), everything))
-    near = (gap > 0.0) & (gap < _NEAR) & (offset >= 0.0) & (offset <= system.pair_length[everything])
+    near = (
+        (gap > 0.0) & (gap < _NEAR) & (offset >= 0.0) & (offset <= system.pair_length[everything])
+    )
     near[pairs] = False
     missed = sorted(np.flatnonzero(near), key=lambda pair: gap[pair])[:4]
     if not missed:
@@ -216,8 +220,12 @@ def _missing_contacts(
     """Contacts that the goal names and that do not touch in it."""
     names = system.contact_names([int(pair) for pair in examined.pairs])
     return [
-        Finding(file, 'goal.contacts', f'{name}, which does not touch in the goal grasp', 'a contact of '
-                f'the goal grasp: {", ".join(names) or "none"}')
+        Finding(
+            file,
+            'goal.contacts',
+            f'{name}, which does not touch in the goal grasp',
+            f'a contact of the goal grasp: {", ".join(names) or "none"}',
+        )
         for name in wanted
         if name not in names
     ]

@@ -36,7 +36,17 @@ class Projected(NamedTuple):
 
 
 def independent_rows(gradients: FloatArray) -> tuple[int, ...]:
-    """Choose a largest independent set of rows, earlier rows first (Gram-Schmidt)."""
+    """Choose a largest independent set of rows, earlier rows first.
+
+    Args:
+        gradients: Shape (k, m).
+
+    Returns:
+        Ascending indices.
+    """
+    count, width = gradients.shape
+    if count <= width and float(np.linalg.svd(gradients, compute_uv=False)[-1]) > 1e-3:
+        return tuple(range(count))
     basis: list[FloatArray] = []
     chosen = []
     for index, row in enumerate(gradients):

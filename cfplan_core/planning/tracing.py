@@ -35,6 +35,8 @@ STEP = 0.04
 _STRETCH = 10
 _SMALLEST_STEP = 1e-7
 LONGEST = 100.0
+_ENCLOSED = 1e-8
+_CLOSE = np.array([-0.1, -1e-2, -1e-3, -1e-4, -1e-6, 1e-6, 1e-4, 1e-3, 1e-2, 0.1])
 _LOCATED = 1e-11
 
 # Chooses the motion from a configuration and the tangent basis there: a vector in the span of the
@@ -62,11 +64,51 @@ class Trace:
         return np.asarray(self.points[-1])
 
 
-def root(function: Callable[[float], float]) -> float:
-    """Root of a function that changes its sign between 0 and 1, by Brent's method."""
-    from scipy.optimize import brentq  # Costs half a second to import.
+def enclose(function: Callable[[FloatArray], FloatArray]) -> tuple[float, float]:
+    """Enclose a root of a function that changes its sign between 0 and 1.
 
-    return float(brentq(function, 0.0, 1.0, xtol=1e-9))
+    Inverse polynomial interpolation, kept inside a bracket. The function is evaluated at several
+    places at once, which costs hardly more than at one: first spread over the interval, then
+    around the interpolated root at ever smaller distances on either side.
+
+    Args:
+        function: Maps places, shape (s,), to values, shape (s,).
+
+    Returns:
+        Ends of an interval of at most 1e-8 in which the sign changes.
+    """
+    places = np.linspace(0.0, 1.0, 9)
+    values = function(places)
+    while True:
+        first = int(np.argmax((values > 0.0) != (values[0] > 0.0)))
+        low, high = float(places[first - 1]), float(places[first])
+        if high - low <= _ENCLOSED or first == 0:
+            return low, high
+        guess = _inverse(places, values, first)
+        if not low < guess < high:
+            guess = 0.5 * (low + high)
+        more = np.concatenate([guess + (high - low) * _CLOSE, [0.5 * (low + high)]])
+        more = np.unique(more[(more > low) & (more < high)])
+        kept = slice(max(first - 3, 0), first)
+        places = np.concatenate([places[kept], more, [high]])
+        values = np.concatenate([values[kept], function(more), [values[first]]])
+
+
+def _inverse(places: FloatArray, values: FloatArray, first: int) -> float:
+    """Place of value zero on the polynomial place(value) through neighbours of the root.
+
+    Margins have a kink where they are zero: four points before it are better than some on either
+    side.
+    """
+    near = slice(first - 4, first) if first >= 4 else slice(0, first + 1)
+    x, y = places[near], values[near]
+    total = 0.0
+    for i, (place, value) in enumerate(zip(x, y, strict=True)):
+        others = np.delete(y, i)
+        if (others == value).any():
+            return float(np.nan)
+        total += float(place * np.prod(others / (others - value)))
+    return total
 
 
 def classify(margins: Margins) -> Stability:
@@ -231,7 +273,9 @@ class _Pursuit:
                 return self._finish(EventKind.LOST)
         if changed < sighting.interval or (changed == sighting.interval and not sighting.closer):
             candidates = sighting.candidates if changed == sighting.interval else ()
-            ended = self._end(samples, changed, candidates, direction)
+            stable = margins.stable[changed + 1] > STABILITY_MARGIN
+            kind = EventKind.CLASS_CHANGE if stable else EventKind.UNSTABLE
+            ended = self._end(samples, changed, candidates, direction, kind)
             if ended is not None:
                 return ended
         elif sighting.closer and self.step > STEP / 100:
@@ -284,6 +328,7 @@ class _Pursuit:
         interval: int,
         candidates: tuple[Candidate, ...],
         direction: FloatArray,
+        class_change: EventKind | None = None,
     ) -> Trace | None:
         """Locate the first of the events in an interval and finish, or go on if it was none."""
         before, after = samples[interval], samples[interval + 1]
@@ -293,9 +338,9 @@ class _Pursuit:
             return float((z - samples[0]) @ unit)
 
         located: list[tuple[float, FloatArray, EventKind, int]] = []
-        change = self._locate_class_change(samples[0], before, after, direction)
-        if change is not None:
-            located.append((along(change[0]), *change, -1))
+        if class_change is not None:
+            z = self._locate_class_change(samples[0], before, after)
+            located.append((along(z), z, class_change, -1))
         tried: set[tuple[EventKind, int]] = set()
         while candidates:
             for candidate in candidates:
@@ -344,7 +389,7 @@ class _Pursuit:
             placed = system.place(z[None])
             matrix[:k] = gap_gradients(system, placed, self.rows)[0]
             residual[:k] = gaps(system, placed, self.rows).gap[0]
-            residual[k], matrix[k] = self._event(candidate, z, placed)
+            (residual[k],), (matrix[k],) = self._event(candidate, z[None], placed)
             matrix[k + 1 :] = across
             residual[k + 1 :] = across @ (z - origin)
             try:
@@ -371,13 +416,22 @@ class _Pursuit:
 
     def _event(
         self, candidate: Candidate, z: FloatArray, placed: Placement
-    ) -> tuple[float, FloatArray]:
-        """Function whose root the event is and its gradient, at z of shape (3 + n,)."""
+    ) -> tuple[FloatArray, FloatArray]:
+        """Function whose root the event is, and its gradient.
+
+        Args:
+            candidate: The event.
+            z: Shape (s, 3 + n).
+            placed: The features at z.
+
+        Returns:
+            Values, shape (s,), and gradients, shape (s, 3 + n).
+        """
         system = self.system
         if candidate.kind is EventKind.JOINT_LIMIT:
-            return float(z[3 + candidate.index]) - candidate.target, np.eye(system.dof)[
-                3 + candidate.index
-            ]
+            column = 3 + candidate.index
+            unit = np.eye(system.dof)[column]
+            return z[:, column] - candidate.target, np.tile(unit, (len(z), 1))
         pair = np.array([candidate.index], dtype=np.intp)
         if candidate.kind in (EventKind.FLUSH_AFTER, EventKind.FLUSH_BEFORE):
             side = 0 if candidate.kind is EventKind.FLUSH_AFTER else 1
@@ -389,7 +443,7 @@ class _Pursuit:
         else:
             value = gaps(system, placed, pair).gap
             gradient = gap_gradients(system, placed, pair)
-        return float(value[0, 0]), gradient[0, 0]
+        return value[:, 0], gradient[:, 0]
 
     def _find(
         self,
@@ -412,53 +466,43 @@ class _Pursuit:
         if between(z):
             return z
         # Another root, or contacts that become dependent just there: enclose it.
-
-        def at(fraction: float) -> FloatArray:
-            guess = before + fraction * (after - before)
-            return project(self.system, self.rows, origin, self.basis, guess[None]).points[0]
-
-        def value(fraction: float) -> float:
-            z = at(fraction)
-            return self._event(candidate, z, self.system.place(z[None]))[0]
-
-        if value(0.0) * value(1.0) >= 0.0:
+        if not self._changes_sign(candidate, before, after):
             return None
-        enclosed = at(root(value))
+
+        def values(places: FloatArray) -> FloatArray:
+            points = self._between(origin, before, after, places)
+            return self._event(candidate, points, self.system.place(points))[0]
+
+        _, place = enclose(values)
+        enclosed = self._between(origin, before, after, np.array([place]))[0]
         z = self._newton(candidate, enclosed, origin, direction)
         return z if between(z) else enclosed
 
+    def _changes_sign(self, candidate: Candidate, before: FloatArray, after: FloatArray) -> bool:
+        points = np.stack([before, after])
+        first, last = self._event(candidate, points, self.system.place(points))[0]
+        return bool(first * last < 0.0)
+
+    def _between(
+        self, origin: FloatArray, before: FloatArray, after: FloatArray, places: FloatArray
+    ) -> FloatArray:
+        """Points of the manifold between two of its points, at fractions of shape (s,)."""
+        guesses = before + places[:, None] * (after - before)
+        return project(self.system, self.rows, origin, self.basis, guesses).points
+
     def _locate_class_change(
-        self, origin: FloatArray, before: FloatArray, after: FloatArray, direction: FloatArray
-    ) -> tuple[FloatArray, EventKind] | None:
-        """Brent's method on the margins between two points, if the class differs at the second."""
+        self, origin: FloatArray, before: FloatArray, after: FloatArray
+    ) -> FloatArray:
+        """Find the last configuration of a class that holds at the first of two points only."""
         form = self.stability is Stability.FORM_CLOSURE
 
-        def at(fraction: float) -> FloatArray:
-            guess = before + fraction * (after - before)
-            return project(self.system, self.rows, origin, self.basis, guess[None]).points
+        def holds(places: FloatArray) -> FloatArray:
+            """Positive where the class is that of the first point."""
+            points = self._between(origin, before, after, places)
+            stable, form_closure = self.model.margins(self._gradients(points, self.contacts))
+            if form:
+                return form_closure - STABILITY_MARGIN
+            return np.minimum(stable - STABILITY_MARGIN, STABILITY_MARGIN - form_closure)
 
-        def margins(fraction: float) -> Margins:
-            return self.model.margins(self._gradients(at(fraction), self.contacts))
-
-        def stable(fraction: float) -> float:
-            return float(margins(fraction).stable[0]) - STABILITY_MARGIN
-
-        def form_closure(fraction: float) -> float:
-            return float(margins(fraction).form_closure[0]) - STABILITY_MARGIN
-
-        for function, kind, wanted in (
-            (form_closure, EventKind.CLASS_CHANGE, form),
-            (stable, EventKind.UNSTABLE, True),
-        ):
-            ends = function(0.0) > 0.0, function(1.0) > 0.0
-            if kind is EventKind.UNSTABLE and form:
-                continue
-            if ends[1] == wanted:
-                continue
-            if ends[0] != wanted:
-                return at(0.0)[0], kind
-            place = root(function)
-            # Stay on the side that still holds.
-            holds = place if (function(place) > 0.0) == wanted else max(place - 2e-9, 0.0)
-            return at(holds)[0], kind
-        return None
+        place = np.array([enclose(holds)[0]])
+        return np.asarray(self._between(origin, before, after, place)[0])

@@ -19,7 +19,7 @@ from cfplan_core.contact.gaps import gap_gradients, gaps, offset_gradients
 from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel
-from cfplan_core.planning.manifold import independent_rows, tangent_basis
+from cfplan_core.planning.manifold import RANK_TOLERANCE, independent_rows
 from cfplan_core.planning.tracing import STABILITY_MARGIN
 
 # Contacts are located to 1e-11: what is nearer than this touches.
@@ -110,51 +110,49 @@ def departures(
     count = len(around.pairs)
     found = []
     for size in range(dof - 1, count + 1):
-        for kept in combinations(range(count), size):
-            found += _leaving(around, model, kept, dof, failures)
+        subsets = [
+            kept
+            for kept in combinations(range(count), size)
+            if not around.together[np.ix_(kept, kept)].any()
+        ]
+        if not subsets:
+            continue
+        gradients = around.gradients[np.array(subsets)]
+        _, singular, right = np.linalg.svd(gradients)
+        curves = (singular > RANK_TOLERANCE).sum(axis=1) == dof - 1
+        stable = model.margins(gradients).stable > STABILITY_MARGIN
+        failures['unstable contact formation'] += int((curves & ~stable).sum())
+        for k in np.flatnonzero(curves & stable):
+            found += _leaving(around, subsets[k], right[k, -1], failures)
     return found
 
 
 def _leaving(
-    around: Surroundings,
-    model: ContactModel,
-    kept: tuple[int, ...],
-    dof: int,
-    failures: Counter[str],
+    around: Surroundings, kept: tuple[int, ...], tangent: FloatArray, failures: Counter[str]
 ) -> list[Departure]:
+    """Directions along a formation's tangent in which it can be left for."""
     keep = list(kept)
-    if around.together[np.ix_(keep, keep)].any():
-        return []
-    gradients = around.gradients[keep]
-    rows = list(independent_rows(gradients))
-    if len(rows) != dof - 1:
-        return []
     others = [i for i in range(len(around.pairs)) if i not in kept]
-    if not model.margins(gradients[None]).stable[0] > STABILITY_MARGIN:
-        failures['unstable contact formation'] += 1
-        return []
-    (tangent,) = tangent_basis(gradients[rows])
-    beside = around.together[:, keep].any(axis=1)
-    opening = [i for i in others if not beside[i]]
+    opening = [i for i in others if not around.together[i, keep].any()]
     rates = around.gradients[opening] @ tangent
-    if len(opening) and np.abs(rates).min() < _STILL and len(rows) < len(kept) + 1:
-        dependent = [i for i, r in zip(opening, rates, strict=True) if abs(r) < _STILL]
-        if len(independent_rows(around.gradients[[*keep, *dependent]])) == len(rows):
+    still = [i for i, rate in zip(opening, rates, strict=True) if abs(rate) < _STILL]
+    if still:
+        rank = len(independent_rows(around.gradients[keep]))
+        if len(independent_rows(around.gradients[[*keep, *still]])) == rank:
             # These contacts stay: the larger formation is the one that leads on.
             return []
     inward = around.inward[keep] @ tangent
     if (np.abs(inward[around.at_end[keep]]) < _STILL).any():
         failures['a vertex would be held on a vertex'] += 1
         return []
+    pairs = tuple(int(around.pairs[i]) for i in keep)
+    leaving = frozenset(int(around.pairs[i]) for i in opening)
     found = []
     for sign in (1.0, -1.0):
         if (sign * rates < -_STILL).any():
             failures['a contact would penetrate'] += 1
-            continue
-        if (sign * inward < -_STILL).any():
+        elif (sign * inward < -_STILL).any():
             failures['a contact would leave its edge'] += 1
-            continue
-        pairs = tuple(int(around.pairs[i]) for i in keep)
-        leaving = frozenset(int(around.pairs[i]) for i in opening)
-        found.append(Departure(Formation(pairs), sign * tangent, leaving))
+        else:
+            found.append(Departure(Formation(pairs), sign * tangent, leaving))
     return found
