@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.errors import CfplanError
+from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Problem
-from cfplan_core.planning.grasp_check import check_problem, examine_grasp
+from cfplan_core.planning.goal_test import GoalTest
+from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.search import Search, Tree
-from cfplan_core.trajectory.frames import build_frames
+from cfplan_core.trajectory.frames import Frames, build_frames, overloaded_legs
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
 
 
@@ -101,24 +103,21 @@ class _Planning:
         self.search: Search | None = None
 
     def run(self) -> PlanResult:
-        findings = check_problem(self.problem)
-        if findings:
-            return self._answer(Status.INVALID, '\n'.join(str(finding) for finding in findings))
-        goal = self.problem.goal.grasp(self.problem.hand)
-        if goal is None:
-            return self._answer(Status.INVALID, 'goal: expected an object pose and all joints')
-        start, end = (
-            examine_grasp(self.system, self.model, grasp, name, '').z
-            for name, grasp in (('start', self.problem.start), ('goal', goal))
-        )
-        self.search = Search(self.roadmap, start, end, self._grown)
+        examined = examine_problem(self.system, self.model)
+        if examined.findings:
+            message = '\n'.join(str(finding) for finding in examined.findings)
+            return self._answer(Status.INVALID, message)
+        goal: FloatArray | GoalTest
+        if examined.goal is not None:
+            goal = examined.goal.z
+        else:
+            goal = GoalTest(self.system, self.problem.goal)
         try:
-            joined = self.search.run()
+            frames = self._search(examined.start.z, goal)
         except _BudgetExhaustedError as stop:
             return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
-        if not joined:
+        if frames is None:
             return self._answer(Status.INFEASIBLE, f'no path; {self._explored()}')
-        frames = build_frames(self.system, self.model, self.search.path())
         return replace(
             self._answer(Status.SOLVED, ''),
             times=frames.times,
@@ -128,6 +127,24 @@ class _Planning:
             torque_upper=frames.torque_upper,
             segments=frames.segments,
         )
+
+    def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> Frames | None:
+        """Search until a path is found that the joints' efforts can hold.
+
+        Efforts are looked at on paths only: pieces that need more than a joint's limit are blocked
+        and the search is run again on the roadmap that is there.
+        """
+        blocked: frozenset[int] = frozenset()
+        while True:
+            self.search = Search(self.roadmap, start, goal, blocked, self._grown)
+            if not self.search.run():
+                return None
+            legs = self.search.path()
+            too_weak = overloaded_legs(self.system, self.model, legs)
+            if not too_weak:
+                return build_frames(self.system, self.model, legs)
+            blocked |= {legs[index].piece for index in too_weak}
+            self.roadmap.failures['a joint would exceed its effort limit'] += len(too_weak)
 
     def _checkpoint(self) -> None:
         """Stop the search when it has to."""

@@ -39,17 +39,42 @@ def span_margin(vectors: FloatArray) -> FloatArray:
         span R³. Continuous in the vectors but where two become parallel: there it may jump,
         between values of one sign. -1 for fewer than four vectors or rank below two.
     """
+    height, length = _heights(vectors)
+    return _margin(height, length)
+
+
+def span_margins(vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return `span_margin` of vectors of shape (s, k, 3) and of all of them but the last."""
+    height, length = _heights(vectors)
     count = vectors.shape[1]
-    if count < 4:
-        return np.full(len(vectors), -1.0)
-    first, second, own = _planes(count)
+    rest = _planes(count)[1] < count - 1
+    return _margin(height, length), _margin(height[:, rest, :-1], length[:, rest])
+
+
+def _heights(vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Heights of all vectors over all planes, times the plane's length, which is returned too.
+
+    Args:
+        vectors: Shape (s, k, 3).
+
+    Returns:
+        Shapes (s, p, k) and (s, p) for the p pairs of vectors.
+    """
+    first, second, _ = _planes(vectors.shape[1])
     a, b = vectors[:, first], vectors[:, second]
     normal = np.empty_like(a)
     normal[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     normal[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
     normal[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    length = np.sqrt((normal**2).sum(axis=-1))
-    height = normal @ vectors.transpose(0, 2, 1)
+    length = np.sqrt(np.einsum('spi,spi->sp', normal, normal))
+    return normal @ vectors.transpose(0, 2, 1), length
+
+
+def _margin(height: FloatArray, length: FloatArray) -> FloatArray:
+    count = height.shape[-1]
+    if count < 4:
+        return np.full(len(height), -1.0)
+    own = _planes(count)[2]
     emptier = np.minimum((height - own).max(axis=-1), -(height + own).min(axis=-1))
     margin = np.where(length > _PARALLEL, emptier / np.maximum(length, _PARALLEL), np.inf)
     smallest = margin.min(axis=-1)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple, Protocol
 
+from cfplan_core.contact.system import BoolArray
 from cfplan_core.geometry.polygon import FloatArray
 
 
@@ -66,6 +67,14 @@ class ContactModel(Protocol):
         Infinite where unbounded; NaN where no equilibrium exists or the wrenches have a rank
         below 3, so that the contacts alone do not hold the object. The links' weight is not
         included.
+        """
+
+    def holds_within(
+        self, gradients: FloatArray, lower: FloatArray, upper: FloatArray
+    ) -> BoolArray:
+        """Tell where torques between limits, each of shape (s, n), keep all contacts; shape (s,).
+
+        Unlike `torque_limits` this asks for all joints at once.
         """
 
     def motion(self, gradients: FloatArray, joint_velocity: FloatArray) -> Motion:

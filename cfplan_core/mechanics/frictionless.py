@@ -12,10 +12,10 @@ from itertools import combinations
 
 import numpy as np
 
-from cfplan_core.contact.system import IntArray
+from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.errors import JammedError
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.mechanics.closure import span_margin
+from cfplan_core.mechanics.closure import span_margins
 from cfplan_core.mechanics.contact_model import Margins, Motion
 
 _SINGULAR = 1e-12
@@ -57,20 +57,56 @@ class FrictionlessModel:
 
     def margins(self, gradients: FloatArray) -> Margins:
         """Judge stability: the columns of W and f, or of W alone, positively span R³."""
-        wrenches = gradients[..., :3]
-        form_closure = span_margin(wrenches)
-        if not self.load.any():
-            return Margins(form_closure, form_closure)
-        load = np.broadcast_to(self.load, (len(wrenches), 1, 3))
-        stable = span_margin(np.concatenate([wrenches, load], axis=1))
+        vectors = np.empty((len(gradients), gradients.shape[1] + 1, 3))
+        vectors[:, :-1] = gradients[..., :3]
+        vectors[:, -1] = self.load
+        stable, form_closure = span_margins(vectors)
         # Both are positive in form closure, but the load may make the margin smaller.
         return Margins(np.maximum(stable, form_closure), form_closure)
 
     def torque_limits(self, gradients: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Minimum and maximum of τ_j over {c ≥ 0, W c = −f}, over its vertices and rays."""
         w, j = gradients[..., :3], gradients[..., 3:]
-        count = w.shape[1]
-        triples = _subsets(count, 3)
+        torques, feasible = self._equilibria(w, j)
+        lower = np.where(feasible[..., None], torques, np.inf).min(axis=1, initial=np.inf)
+        upper = np.where(feasible[..., None], torques, -np.inf).max(axis=1, initial=-np.inf)
+        self._open_unbounded(w, j, lower, upper)
+        impossible = ~feasible.any(axis=1)
+        lower[impossible] = upper[impossible] = np.nan
+        return lower, upper
+
+    def holds_within(
+        self, gradients: FloatArray, lower: FloatArray, upper: FloatArray
+    ) -> BoolArray:
+        """Look for an equilibrium within torque limits: a vertex, else by linear programming."""
+        w, j = gradients[..., :3], gradients[..., 3:]
+        torques, feasible = self._equilibria(w, j)
+        within = (torques >= lower[:, None]) & (torques <= upper[:, None])
+        holds = (feasible & within.all(axis=-1)).any(axis=1)
+        for index in np.flatnonzero(~holds):
+            from scipy.optimize import linprog  # Costs half a second to import.
+
+            found = linprog(
+                np.zeros(w.shape[1]),
+                A_ub=np.concatenate([-j[index].T, j[index].T]),
+                b_ub=np.concatenate([upper[index], -lower[index]]),
+                A_eq=w[index].T,
+                b_eq=-self.load,
+            )
+            holds[index] = found.status == 0
+        return np.asarray(holds)
+
+    def _equilibria(self, w: FloatArray, j: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Torques at the basic solutions of W c = −f, and which of them have c ≥ 0.
+
+        Args:
+            w: Shape (s, k, 3).
+            j: Shape (s, k, n).
+
+        Returns:
+            Shapes (s, b, n) and (s, b) for the b choices of three contacts.
+        """
+        triples = _subsets(w.shape[1], 3)
         a, b, c = (w[:, triples[:, i]] for i in range(3))
         bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)
         determinant = _dot(a, bc)
@@ -80,13 +116,7 @@ class FrictionlessModel:
         forces = forces / safe[..., None]
         scale = 1.0 + np.abs(forces).max(axis=-1)
         feasible = regular & (forces.min(axis=-1) >= -_NEGATIVE * scale)
-        torques = -np.einsum('stc,stcn->stn', forces, j[:, triples])
-        lower = np.where(feasible[..., None], torques, np.inf).min(axis=1, initial=np.inf)
-        upper = np.where(feasible[..., None], torques, -np.inf).max(axis=1, initial=-np.inf)
-        self._open_unbounded(w, j, lower, upper)
-        impossible = ~feasible.any(axis=1)
-        lower[impossible] = upper[impossible] = np.nan
-        return lower, upper
+        return -np.einsum('stc,stcn->stn', forces, j[:, triples]), feasible
 
     @staticmethod
     def _open_unbounded(

@@ -59,6 +59,21 @@ class ExaminedGrasp:
     findings: tuple[Finding, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class ExaminedProblem:
+    """Start and goal of a problem, and all that is wrong with them.
+
+    Attributes:
+        start: The start grasp.
+        goal: The goal grasp, None if the goal gives less than a whole grasp.
+        findings: Of both, and of the problem itself.
+    """
+
+    start: ExaminedGrasp
+    goal: ExaminedGrasp | None
+    findings: tuple[Finding, ...]
+
+
 def describe_grasp(problem: Problem, grasp: Grasp) -> GraspDescription:
     """Name a grasp's contacts, stability class and dimension."""
     system = ContactSystem(problem)
@@ -81,6 +96,15 @@ def check_problem(problem: Problem, file: str = '<problem>') -> tuple[Finding, .
         Findings on start and goal: links or object that overlap, contacts that do not touch, an
         unstable grasp, friction that no contact model takes.
     """
+    system = ContactSystem(problem)
+    return examine_problem(system, FrictionlessModel(system.load), file).findings
+
+
+def examine_problem(
+    system: ContactSystem, model: ContactModel, file: str = '<problem>'
+) -> ExaminedProblem:
+    """Examine start and goal; see `check_problem`."""
+    problem = system.problem
     findings = []
     if problem.friction > 0.0:
         findings.append(
@@ -88,15 +112,15 @@ def check_problem(problem: Problem, file: str = '<problem>') -> tuple[Finding, .
                 file, 'contact.friction', f'{problem.friction:g}', '0.0: contacts without friction'
             )
         )
-    system = ContactSystem(problem)
-    model = FrictionlessModel(system.load)
-    findings += examine_grasp(system, model, problem.start, 'start', file).findings
-    goal = problem.goal.grasp(problem.hand)
-    if goal is not None:
-        examined = examine_grasp(system, model, goal, 'goal', file)
-        findings += examined.findings
-        findings += _missing_contacts(system, examined, problem.goal.contacts or (), file)
-    return tuple(findings)
+    start = examine_grasp(system, model, problem.start, 'start', file)
+    findings += start.findings
+    goal = None
+    whole = problem.goal.grasp(problem.hand)
+    if whole is not None:
+        goal = examine_grasp(system, model, whole, 'goal', file)
+        findings += goal.findings
+        findings += _missing_contacts(system, goal, problem.goal.contacts or (), file)
+    return ExaminedProblem(start, goal, tuple(findings))
 
 
 def examine_grasp(

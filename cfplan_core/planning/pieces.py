@@ -66,15 +66,15 @@ class Piece:
         """Points from one configuration on the piece to another, shape (s, 3 + n)."""
         if self.dimension == 0:
             return start[None]
-        a, b = self._place(start), self._place(end)
+        a, b = self.place(start), self.place(end)
         low, high = min(a, b), max(a, b)
         between = self.points[int(np.floor(low)) + 1 : int(np.ceil(high))]
         if b < a:
             between = between[::-1]
         return np.concatenate([start[None], between, end[None]])
 
-    def _place(self, z: FloatArray) -> float:
-        """Where a configuration lies on the curve, in units of points."""
+    def place(self, z: FloatArray) -> float:
+        """Tell where a configuration lies on the curve: an index of `points`, or between two."""
         for place, end in ((0, self.points[0]), (len(self.points) - 1, self.points[-1])):
             if np.abs(end - z).max() < SAME:
                 return float(place)

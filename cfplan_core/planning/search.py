@@ -16,6 +16,7 @@ import numpy as np
 from cfplan_core.contact.formation import Formation
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
+from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.pieces import Piece
 from cfplan_core.planning.roadmap import Roadmap
 
@@ -25,11 +26,13 @@ class Leg:
     """A stretch of a path inside one piece.
 
     Attributes:
+        piece: Index of the piece.
         formation: The contacts.
         stability: The class.
         points: Shape (s, 3 + n); the first is the last of the leg before.
     """
 
+    piece: int
     formation: Formation
     stability: Stability
     points: FloatArray
@@ -83,19 +86,20 @@ class Tree:
 
 
 class Search:
-    """Two trees over one roadmap.
+    """Two trees over one roadmap; only the initial one if the goal is not a whole grasp.
 
     Attributes:
         roadmap: What was explored.
         trees: The initial and the goal tree.
-        meeting: Index of the piece where they joined, or None.
+        meeting: Index of the piece where they joined or the goal was found, or None.
     """
 
     def __init__(
         self,
         roadmap: Roadmap,
         start: FloatArray,
-        goal: FloatArray,
+        goal: FloatArray | GoalTest,
+        blocked: frozenset[int] = frozenset(),
         grown: Callable[[int, int], None] = lambda initial, goal: None,
     ) -> None:
         """Root the trees.
@@ -103,56 +107,84 @@ class Search:
         Args:
             roadmap: To grow in.
             start: Stable configuration, shape (3 + n,).
-            goal: Stable configuration, shape (3 + n,).
+            goal: Stable configuration, shape (3 + n,), or a test that finds one on a piece.
+            blocked: Indices of pieces that may not be used.
             grown: Called with the numbers of nodes whenever one is added; may raise to interrupt.
         """
         self.roadmap = roadmap
-        self.trees = (Tree(start), Tree(goal))
+        self.trees = (Tree(start), Tree(start))
         self.meeting: int | None = None
+        self._test: GoalTest | None = None
+        if isinstance(goal, GoalTest):
+            self._test = goal
+            self._roots = self.trees[:1]
+        else:
+            self.trees = (Tree(start), Tree(goal))
+            self._roots = self.trees
+        self._blocked = blocked
         self._grown = grown
         self._crossing = False
 
     def run(self) -> bool:
         """Grow until the trees join (true) or one of them is complete without it (false)."""
-        for tree in self.trees:
-            tree.frontier = [tree.add(Node(self.roadmap.root(tree.root), None, None, 0))]
-        if self.trees[0].nodes[0].piece is self.trees[1].nodes[0].piece:
-            self.meeting = self.trees[0].nodes[0].piece.index
+        for tree in self._roots:
+            piece = self.roadmap.root(tree.root)
+            if piece.index in self._blocked:
+                return False
+            tree.frontier = [tree.add(Node(piece, None, None, 0))]
+        self._look(self.trees[0].nodes[0].piece)
         self._alternate()
         if self.meeting is None:
             # Points and curves are exhausted: open contacts and cross regions.
             self._crossing = True
-            for tree in self.trees:
+            for tree in self._roots:
                 tree.frontier = list(range(len(tree.nodes)))
             self._alternate()
         return self.meeting is not None
 
+    def _look(self, piece: Piece) -> bool:
+        """Tell whether a piece of the initial tree ends the search, and remember it if so."""
+        if self._test is None:
+            found = piece.index in self.trees[1].index_of
+        else:
+            goal = self._test(piece)
+            found = goal is not None
+            if goal is not None:
+                self.trees[1].root = goal
+                self.trees[1].add(Node(piece, None, None, 0))
+        if found:
+            self.meeting = piece.index
+        return found
+
     def _alternate(self) -> None:
         """Grow the smaller tree until they join or one is complete."""
-        while self.meeting is None and all(tree.frontier for tree in self.trees):
-            initial, goal = self.trees
-            smaller = 0 if len(initial.frontier) <= len(goal.frontier) else 1
-            self._grow(self.trees[smaller], self.trees[1 - smaller])
+        while self.meeting is None and all(tree.frontier for tree in self._roots):
+            tree = min(self._roots, key=lambda tree: len(tree.frontier))
+            self._grow(tree)
 
     def _neighbours(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
         yield from self.roadmap.neighbours(piece)
         if self._crossing:
             yield from self.roadmap.regions.beside(piece)
 
-    def _grow(self, tree: Tree, other: Tree) -> None:
+    def _grow(self, tree: Tree) -> None:
         """Add a level to a tree; join at the common piece of least depth, if there is one."""
+        other = self.trees[1] if tree is self.trees[0] else self.trees[0]
         level = []
         best: tuple[int, int] | None = None
         for index in tree.frontier:
             node = tree.nodes[index]
             for entry, piece in self._neighbours(node.piece):
-                if piece.index in tree.index_of:
+                if piece.index in tree.index_of or piece.index in self._blocked:
                     continue
                 level.append(tree.add(Node(piece, index, entry, node.depth + 1)))
-                if piece.index in other.index_of:
+                self._grown(len(self.trees[0].nodes), len(self.trees[1].nodes))
+                if self._test is not None:
+                    if self._look(piece):
+                        return
+                elif piece.index in other.index_of:
                     depth = node.depth + 1 + other.nodes[other.index_of[piece.index]].depth
                     best = min(best or (depth, piece.index), (depth, piece.index))
-                self._grown(len(self.trees[0].nodes), len(self.trees[1].nodes))
         tree.frontier = level
         if best is not None:
             self.meeting = best[1]
@@ -169,10 +201,10 @@ class Search:
         stops += [node.entry for node in initial if node.entry is not None]
         stops += [node.entry for node in reversed(goal) if node.entry is not None]
         stops.append(self.trees[1].root)
-        legs = []
+        legs: list[Leg] = []
         for piece, begin, end in zip(pieces, stops[:-1], stops[1:], strict=True):
             points = piece.path(begin, end)
             still = len(points) < 2 or not np.abs(points - points[0]).max() > 0.0
             if not still or len(pieces) == 1:
-                legs.append(Leg(piece.formation, piece.stability, points))
+                legs.append(Leg(piece.index, piece.formation, piece.stability, points))
         return legs

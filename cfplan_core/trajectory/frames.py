@@ -34,6 +34,21 @@ class Frames:
     segments: tuple[Segment, ...]
 
 
+def overloaded_legs(
+    system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
+) -> list[int]:
+    """Tell which legs no torques within the joints' effort limits can hold, by index."""
+    effort = np.array([joint.effort_limit for joint in system.problem.hand.joints])
+    effort = effort / (system.force_unit * system.size)
+    overloaded = []
+    for index, leg in enumerate(legs):
+        weight = system.link_weight_torques(leg.points)
+        gradients = gap_gradients(system, system.place(leg.points), leg.formation.array)
+        if not model.holds_within(gradients, -effort - weight, effort - weight).all():
+            overloaded.append(index)
+    return overloaded
+
+
 def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> Frames:
     """Sample a path into frames.
 
