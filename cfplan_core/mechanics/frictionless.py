@@ -15,7 +15,7 @@ import numpy as np
 from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.errors import JammedError
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.mechanics.closure import span_margins
+from cfplan_core.mechanics.closure import span_margin, span_margins
 from cfplan_core.mechanics.contact_model import Margins, Motion
 
 _SINGULAR = 1e-12
@@ -86,10 +86,12 @@ class FrictionlessModel:
         for index in np.flatnonzero(~holds):
             from scipy.optimize import linprog  # Costs half a second to import.
 
+            limits = np.concatenate([upper[index], -lower[index]])
+            bounded = np.isfinite(limits)
             found = linprog(
                 np.zeros(w.shape[1]),
-                A_ub=np.concatenate([-j[index].T, j[index].T]),
-                b_ub=np.concatenate([upper[index], -lower[index]]),
+                A_ub=np.concatenate([-j[index].T, j[index].T])[bounded],
+                b_ub=limits[bounded],
                 A_eq=w[index].T,
                 b_eq=-self.load,
             )

@@ -31,7 +31,6 @@ class EventKind(str, Enum):
     EDGE_END = 'a contact reaches the end of its edge'
     FLUSH_AFTER = 'an edge behind a touching vertex comes to lie on an edge'
     FLUSH_BEFORE = 'an edge before a touching vertex comes to lie on an edge'
-    CLASS_CHANGE = 'the stability class changes'
     UNSTABLE = 'stability is lost'
     JOINT_LIMIT = 'a joint reaches its limit'
     LINKS_MEET = 'two links meet'
@@ -48,7 +47,6 @@ OPEN_EVENTS = frozenset(
         EventKind.EDGE_END,
         EventKind.FLUSH_AFTER,
         EventKind.FLUSH_BEFORE,
-        EventKind.CLASS_CHANGE,
     }
 )
 

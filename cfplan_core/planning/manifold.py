@@ -17,7 +17,8 @@ from cfplan_core.geometry.polygon import FloatArray
 
 # Gradients of gaps have rows of size one: below this a row counts as dependent on others.
 RANK_TOLERANCE = 1e-7
-_CONVERGED = 1e-9
+# Newton's method squares the error: after a step this small it is below rounding.
+CONVERGED = 1e-7
 _ITERATIONS = 8
 
 
@@ -113,11 +114,11 @@ def project(
                 break
             change = np.abs(step).max(axis=1)
             points -= step
-            if not (change > _CONVERGED).any():
+            if not (change > CONVERGED).any():
                 break
             if (change > 10.0).any():
                 points[~(change <= 10.0)] = origin
-    return Projected(points, gradients, change <= _CONVERGED)
+    return Projected(points, gradients, change <= CONVERGED)
 
 
 def settle(system: ContactSystem, z: FloatArray, pairs: IntArray) -> FloatArray:

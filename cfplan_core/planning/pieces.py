@@ -20,26 +20,24 @@ class Junction:
     """A configuration where pieces meet.
 
     Attributes:
-        around: What touches there.
+        z: Shape (3 + n,).
         formation: All contacts that touch.
         stability: Of that formation; `UNSTABLE` if a vertex lies on a vertex.
         isolated: True if that formation is a piece of its own: a point, stable.
+        around: What touches there; None where only the stability class changes.
         ways: Ways out, found when first asked for.
         taken: Piece behind each way out that was taken, None where it led nowhere.
+        point: The piece, if isolated and asked for.
     """
 
-    around: Surroundings
+    z: FloatArray
     formation: Formation
     stability: Stability
     isolated: bool
+    around: Surroundings | None
     ways: list[Departure] | None = None
     taken: dict[int, Piece | None] = field(default_factory=dict)
     point: Piece | None = None
-
-    @property
-    def z(self) -> FloatArray:
-        """Configuration, shape (3 + n,)."""
-        return self.around.z
 
 
 @dataclass(eq=False)

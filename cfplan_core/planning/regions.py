@@ -21,6 +21,7 @@ from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.events import OPEN_EVENTS, EventKind
 from cfplan_core.planning.manifold import independent_rows, tangent_basis
 from cfplan_core.planning.pieces import Piece, Region
+from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Trace, classify
 
 if TYPE_CHECKING:
@@ -105,7 +106,8 @@ class Regions:
         if len(trace.points) < 3:
             self._roadmap.failures[f'at once, {trace.kind.value}'] += 1
             return None
-        return self._merge(formation, z, trace.points[: len(trace.points) // 2 + 1])
+        points = split_by_class(self._roadmap.tracer, formation, trace.points)[0][1]
+        return self._merge(formation, z, points[: len(points) // 2 + 1])
 
     def _merge(self, formation: Formation, z: FloatArray, inward: FloatArray) -> Region | None:
         """Find or make the region that points from z lead into."""
@@ -151,6 +153,8 @@ class Regions:
         )
         if trace.kind is not EventKind.TARGET or np.abs(trace.end - end).max() > 1e-6:
             return None
+        if len(split_by_class(self._roadmap.tracer, formation, trace.points)) > 1:
+            return None
         return np.concatenate([trace.points[:-1], end[None]])
 
     def _ray(
@@ -183,6 +187,17 @@ class Regions:
                 region.formation, region.anchor, direction @ basis, frozenset(), np.pi
             )
             roadmap.attempts += 1
+            if len(trace.points) > 1:
+                parts = split_by_class(roadmap.tracer, region.formation, trace.points)
+                if len(parts) > 1:
+                    edge = parts[0][1]
+                    region.links.append((edge[-1], edge))
+                    heading = edge[-1] - edge[-2]
+                    heading = heading / np.linalg.norm(heading)
+                    beyond = self._enter(region.formation, edge[-1], heading, frozenset())
+                    if beyond is not None and beyond is not region:
+                        yield edge[-1], beyond
+                    continue
             if trace.kind not in OPEN_EVENTS or len(trace.points) < 2:
                 roadmap.failures[trace.kind.value] += 1
                 continue
@@ -204,7 +219,7 @@ class Regions:
             yield roadmap.root(z)
             return
         for formation in _alternatives(junction.formation, region.formation):
-            if junction.around.keeps_vertex(formation.pairs):
+            if junction.around is None or junction.around.keeps_vertex(formation.pairs):
                 continue
             gradients = gap_gradients(
                 roadmap.system, roadmap.system.place(z[None]), formation.array

@@ -22,6 +22,7 @@ from cfplan_core.planning.events import OPEN_EVENTS
 from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
 from cfplan_core.planning.pieces import SAME, Junction, Piece
 from cfplan_core.planning.regions import Regions
+from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STEP, Trace, Tracer, classify
 from cfplan_core.planning.transitions import Departure, departures, surroundings
 
@@ -57,7 +58,7 @@ class Roadmap:
         self.attempts = 0
         self._junctions: list[Junction] = []
         self._cells: dict[tuple[int, ...], list[Junction]] = {}
-        self._curves: dict[tuple[Formation, Stability], list[Piece]] = {}
+        self._curves: dict[Formation, list[Piece]] = {}
         self.regions = Regions(self)
 
     def formations(self) -> int:
@@ -71,20 +72,19 @@ class Roadmap:
         junction = self.junction(z)
         if junction.isolated:
             return self._point(junction)
-        rows = list(independent_rows(junction.around.gradients))
-        if self.system.dof - len(rows) > 1:
+        gradients = self.tracer.gradients(z[None], junction.formation.array)[0]
+        basis = tangent_basis(gradients[list(independent_rows(gradients))])
+        if len(basis) > 1:
             return self.regions.around(junction.formation, z)
-        known = self._on_curve(junction.formation, junction.stability, z)
+        known = self._on_curve(junction.formation, z)
         if known is not None:
             return known
-        (tangent,) = tangent_basis(junction.around.gradients[rows])
-        ways = [
-            Departure(junction.formation, sign * tangent, frozenset()) for sign in (1.0, -1.0)
-        ]
+        ways = [Departure(junction.formation, sign * basis[0], frozenset()) for sign in (1.0, -1.0)]
         ahead, behind = (self._follow(z, way) for way in ways)
         points = np.concatenate([behind.points[:0:-1], ahead.points])
         ends = (self._end(behind), self._end(ahead))
-        return self._add_curve(junction.formation, junction.stability, points, ends)
+        pieces = self._add_curve(junction.formation, points, ends)
+        return min(pieces, key=lambda piece: float(np.abs(piece.points - z).max(axis=1).min()))
 
     def neighbours(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
         """Points and curves next to a piece, each with the configuration that lies between."""
@@ -96,8 +96,7 @@ class Roadmap:
             if junction.isolated and piece.dimension > 0:
                 yield junction.z, self._point(junction)
                 continue
-            for way in range(len(self._ways(junction))):
-                taken = self._take(junction, way)
+            for taken in self._behind(junction):
                 if taken is not None and taken is not piece:
                     yield junction.z, taken
 
@@ -117,7 +116,7 @@ class Roadmap:
             and len(independent_rows(around.gradients)) == self.system.dof
         )
         formation = Formation(tuple(int(pair) for pair in around.pairs))
-        junction = Junction(around, formation, stability, isolated)
+        junction = Junction(z, formation, stability, isolated, around)
         self._junctions.append(junction)
         for cell in cells:
             self._cells.setdefault(cell, []).append(junction)
@@ -149,30 +148,35 @@ class Roadmap:
 
     def _ways(self, junction: Junction) -> list[Departure]:
         if junction.ways is None:
+            assert junction.around is not None
             junction.ways = departures(
                 junction.around, self.model, self.system.dof, self.failures
             )
         return junction.ways
 
-    def _take(self, junction: Junction, way: int) -> Piece | None:
-        """Follow one way out of a junction; None if it ends at once."""
-        if way not in junction.taken:
-            junction.taken[way] = self._trace(junction, self._ways(junction)[way])
-        return junction.taken[way]
+    def _behind(self, junction: Junction) -> Iterator[Piece | None]:
+        """Pieces that the ways out of a junction lead to; None for those that end at once."""
+        if junction.around is None:
+            yield from junction.taken.values()
+            return
+        for way, departure in enumerate(self._ways(junction)):
+            if way not in junction.taken:
+                self._trace(junction, way, departure)
+            yield junction.taken[way]
 
-    def _trace(self, junction: Junction, departure: Departure) -> Piece | None:
+    def _trace(self, junction: Junction, way: int, departure: Departure) -> None:
+        """Follow a way out of a junction."""
         self.attempts += 1
+        junction.taken[way] = None
         trace = self._follow(junction.z, departure)
         if np.abs(trace.end - junction.z).max() < SAME:
             self.failures[f'at once, {trace.kind.value}'] += 1
-            return None
-        formation = departure.formation
-        middle = trace.points[len(trace.points) // 2]
-        stability = classify(self.tracer.margins(formation, middle[None]))
-        known = self._on_curve(formation, stability, middle)
+            return
+        known = self._on_curve(departure.formation, trace.points[1])
         if known is not None:
-            return known
-        return self._add_curve(formation, stability, trace.points, (junction, self._end(trace)))
+            junction.taken[way] = known
+        else:
+            self._add_curve(departure.formation, trace.points, (junction, self._end(trace)))
 
     def _follow(self, z: FloatArray, departure: Departure) -> Trace:
         heading = departure.direction
@@ -193,27 +197,43 @@ class Roadmap:
     def _add_curve(
         self,
         formation: Formation,
-        stability: Stability,
         points: FloatArray,
         ends: tuple[Junction | None, Junction | None],
-    ) -> Piece:
-        piece = Piece(len(self.pieces), formation, stability, 1, points, ends)
-        self.pieces.append(piece)
-        self._curves.setdefault((formation, stability), []).append(piece)
-        for junction, z in zip(ends, (points[1], points[-2]), strict=True):
-            if junction is None:
-                continue
-            for way, departure in enumerate(self._ways(junction)):
-                leads = float((z - junction.z) @ departure.direction) > 0.0
-                if departure.formation == formation and leads:
-                    junction.taken[way] = piece
-        return piece
+    ) -> list[Piece]:
+        """Add the pieces of a curve, one after the other, one for each stability class."""
+        parts = split_by_class(self.tracer, formation, points)
+        inner = [
+            Junction(part[-1], formation, Stability.FORM_CLOSURE, False, None)
+            for _, part in parts[:-1]
+        ]
+        borders = [ends[0], *inner, ends[1]]
+        pieces = []
+        for number, (stability, part) in enumerate(parts):
+            between = (borders[number], borders[number + 1])
+            piece = Piece(len(self.pieces), formation, stability, 1, part, between)
+            self.pieces.append(piece)
+            pieces.append(piece)
+        self._curves.setdefault(formation, []).extend(pieces)
+        for junction, before, after in zip(inner, pieces[:-1], pieces[1:], strict=True):
+            junction.taken = {0: before, 1: after}
+        self._register(ends[0], formation, points[1], pieces[0])
+        self._register(ends[1], formation, points[-2], pieces[-1])
+        return pieces
 
-    def _on_curve(
-        self, formation: Formation, stability: Stability, z: FloatArray
-    ) -> Piece | None:
+    def _register(
+        self, junction: Junction | None, formation: Formation, z: FloatArray, piece: Piece
+    ) -> None:
+        """Note at the end of a curve that the way towards its neighbour z is taken."""
+        if junction is None:
+            return
+        for way, departure in enumerate(self._ways(junction)):
+            leads = float((z - junction.z) @ departure.direction) > 0.0
+            if departure.formation == formation and leads:
+                junction.taken[way] = piece
+
+    def _on_curve(self, formation: Formation, z: FloatArray) -> Piece | None:
         """Find the known curve of a formation that a configuration lies on."""
-        for piece in self._curves.get((formation, stability), ()):
+        for piece in self._curves.get(formation, ()):
             near = np.abs(piece.points - z).max(axis=1)
             if near.min() > 2.0 * STEP:
                 continue

@@ -4,7 +4,7 @@ The curve is the formation's manifold itself where that has dimension one, and a
 the manifold where it has more. It is followed in stretches: a whole stretch of steps along the
 tangent is projected onto the manifold by one batched Newton iteration, searched for events, and
 cut at the first. Events are located by Newton's method where their gradient is known (gaps, edge
-ends, joint limits) and by Brent's method otherwise (stability).
+ends, joint limits) and inside a bracket otherwise (stability).
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ from cfplan_core.contact.gaps import (
 from cfplan_core.contact.system import ContactSystem, IntArray, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Margins, Stability
+from cfplan_core.planning.bracketing import enclose
 from cfplan_core.planning.events import Candidate, EventKind, Sighting, may_dip, sight
-from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
+from cfplan_core.planning.manifold import CONVERGED, independent_rows, project, tangent_basis
 
 # Margins below this count as lost: nothing is planned that is held by less.
 STABILITY_MARGIN = 1e-6
@@ -35,9 +36,6 @@ STEP = 0.04
 _STRETCH = 10
 _SMALLEST_STEP = 1e-7
 LONGEST = 100.0
-_ENCLOSED = 1e-8
-_CLOSE = np.array([-0.1, -1e-2, -1e-3, -1e-4, -1e-6, 1e-6, 1e-4, 1e-3, 1e-2, 0.1])
-_LOCATED = 1e-11
 
 # Chooses the motion from a configuration and the tangent basis there: a vector in the span of the
 # basis, beyond whose length it is asked again, or None where there is nowhere left to go.
@@ -62,53 +60,6 @@ class Trace:
     def end(self) -> FloatArray:
         """Last configuration."""
         return np.asarray(self.points[-1])
-
-
-def enclose(function: Callable[[FloatArray], FloatArray]) -> tuple[float, float]:
-    """Enclose a root of a function that changes its sign between 0 and 1.
-
-    Inverse polynomial interpolation, kept inside a bracket. The function is evaluated at several
-    places at once, which costs hardly more than at one: first spread over the interval, then
-    around the interpolated root at ever smaller distances on either side.
-
-    Args:
-        function: Maps places, shape (s,), to values, shape (s,).
-
-    Returns:
-        Ends of an interval of at most 1e-8 in which the sign changes.
-    """
-    places = np.linspace(0.0, 1.0, 9)
-    values = function(places)
-    while True:
-        first = int(np.argmax((values > 0.0) != (values[0] > 0.0)))
-        low, high = float(places[first - 1]), float(places[first])
-        if high - low <= _ENCLOSED or first == 0:
-            return low, high
-        guess = _inverse(places, values, first)
-        if not low < guess < high:
-            guess = 0.5 * (low + high)
-        more = np.concatenate([guess + (high - low) * _CLOSE, [0.5 * (low + high)]])
-        more = np.unique(more[(more > low) & (more < high)])
-        kept = slice(max(first - 3, 0), first)
-        places = np.concatenate([places[kept], more, [high]])
-        values = np.concatenate([values[kept], function(more), [values[first]]])
-
-
-def _inverse(places: FloatArray, values: FloatArray, first: int) -> float:
-    """Place of value zero on the polynomial place(value) through neighbours of the root.
-
-    Margins have a kink where they are zero: four points before it are better than some on either
-    side.
-    """
-    near = slice(first - 4, first) if first >= 4 else slice(0, first + 1)
-    x, y = places[near], values[near]
-    total = 0.0
-    for i, (place, value) in enumerate(zip(x, y, strict=True)):
-        others = np.delete(y, i)
-        if (others == value).any():
-            return float(np.nan)
-        total += float(place * np.prod(others / (others - value)))
-    return total
 
 
 def classify(margins: Margins) -> Stability:
@@ -198,7 +149,6 @@ class _Pursuit:
         self.rows: IntArray = self.contacts[list(chosen)]
         self.redundant = len(chosen) < len(self.contacts)
         self.basis = tangent_basis(gradients[list(chosen)])
-        self.stability: Stability | None = None
 
     def run(self) -> Trace:
         z = self.start
@@ -257,25 +207,21 @@ class _Pursuit:
         if self.fresh and self.departing and self._penetrates(samples[1:2]):
             return self._finish(EventKind.CONTACT, tuple(sorted(self.departing)))
         sighting = sight(self.system, self.formation, samples, placed, self.fresh)
-        margins = self.model.margins(gradients)
-        if self.stability is None:
-            self.stability = classify(Margins(margins.stable[1:2], margins.form_closure[1:2]))
-            if self.stability is Stability.UNSTABLE:
-                return self._finish(EventKind.UNSTABLE)
-        changed = self._class_changes(margins)
+        stable = self.model.margins(gradients).stable - STABILITY_MARGIN
+        lost = int(np.argmax(stable[1:] <= 0.0)) if (stable[1:] <= 0.0).any() else len(stable)
+        if self.fresh and lost == 0:
+            return self._finish(EventKind.UNSTABLE)
         if self.step > STEP / 100:
-            grazing = self._class_grazes(margins)
-            if grazing < min(changed, sighting.interval):
-                sighting = Sighting(grazing, (), True)
+            grazing = np.flatnonzero(may_dip(stable, 0.0))
+            if len(grazing) and grazing[0] < min(lost, sighting.interval):
+                sighting = Sighting(int(grazing[0]), (), True)
         if self.redundant:
             apart = np.abs(gaps(self.system, placed, self.contacts).gap).max(axis=1) > 1e-7
-            if apart.any() and int(np.argmax(apart)) <= min(changed, sighting.interval):
+            if apart.any() and int(np.argmax(apart)) <= min(lost, sighting.interval):
                 return self._finish(EventKind.LOST)
-        if changed < sighting.interval or (changed == sighting.interval and not sighting.closer):
-            candidates = sighting.candidates if changed == sighting.interval else ()
-            stable = margins.stable[changed + 1] > STABILITY_MARGIN
-            kind = EventKind.CLASS_CHANGE if stable else EventKind.UNSTABLE
-            ended = self._end(samples, changed, candidates, direction, kind)
+        if lost < sighting.interval or (lost == sighting.interval and not sighting.closer):
+            candidates = sighting.candidates if lost == sighting.interval else ()
+            ended = self._end(samples, lost, candidates, direction, unstable=True)
             if ended is not None:
                 return ended
         elif sighting.closer and self.step > STEP / 100:
@@ -306,29 +252,13 @@ class _Pursuit:
         within = (offset >= 0.0) & (offset <= self.system.pair_length[pairs])
         return bool((within & (gap < -1e-12)).any())
 
-    def _class_changes(self, margins: Margins) -> int:
-        """First interval behind which the stability class differs; huge if none."""
-        stable = margins.stable[1:] > STABILITY_MARGIN
-        form = margins.form_closure[1:] > STABILITY_MARGIN
-        same = stable & (form == (self.stability is Stability.FORM_CLOSURE))
-        return int(np.argmin(same)) if not same.all() else np.iinfo(int).max
-
-    def _class_grazes(self, margins: Margins) -> int:
-        """First interval beside a sample where the class may change and change back."""
-        form = margins.form_closure if self.stability is Stability.FORM_CLOSURE else (
-            -margins.form_closure
-        )
-        grazes = may_dip(margins.stable, STABILITY_MARGIN) | may_dip(form, STABILITY_MARGIN)
-        samples = np.flatnonzero(grazes)
-        return int(samples[0]) if len(samples) else np.iinfo(int).max
-
     def _end(
         self,
         samples: FloatArray,
         interval: int,
         candidates: tuple[Candidate, ...],
         direction: FloatArray,
-        class_change: EventKind | None = None,
+        unstable: bool = False,
     ) -> Trace | None:
         """Locate the first of the events in an interval and finish, or go on if it was none."""
         before, after = samples[interval], samples[interval + 1]
@@ -338,9 +268,9 @@ class _Pursuit:
             return float((z - samples[0]) @ unit)
 
         located: list[tuple[float, FloatArray, EventKind, int]] = []
-        if class_change is not None:
-            z = self._locate_class_change(samples[0], before, after)
-            located.append((along(z), z, class_change, -1))
+        if unstable:
+            z = self._locate_loss(samples[0], before, after)
+            located.append((along(z), z, EventKind.UNSTABLE, -1))
         tried: set[tuple[EventKind, int]] = set()
         while candidates:
             for candidate in candidates:
@@ -400,7 +330,7 @@ class _Pursuit:
             change = float(np.abs(step).max())
             if change > 1.0:
                 return None
-            if change < _LOCATED:
+            if change < CONVERGED:
                 break
         else:
             return None
@@ -490,19 +420,15 @@ class _Pursuit:
         guesses = before + places[:, None] * (after - before)
         return project(self.system, self.rows, origin, self.basis, guesses).points
 
-    def _locate_class_change(
+    def _locate_loss(
         self, origin: FloatArray, before: FloatArray, after: FloatArray
     ) -> FloatArray:
-        """Find the last configuration of a class that holds at the first of two points only."""
-        form = self.stability is Stability.FORM_CLOSURE
+        """Find the last stable configuration between two points of which the first is stable."""
 
-        def holds(places: FloatArray) -> FloatArray:
-            """Positive where the class is that of the first point."""
+        def margin(places: FloatArray) -> FloatArray:
             points = self._between(origin, before, after, places)
-            stable, form_closure = self.model.margins(self._gradients(points, self.contacts))
-            if form:
-                return form_closure - STABILITY_MARGIN
-            return np.minimum(stable - STABILITY_MARGIN, STABILITY_MARGIN - form_closure)
+            gradients = self._gradients(points, self.contacts)
+            return self.model.margins(gradients).stable - STABILITY_MARGIN
 
-        place = np.array([enclose(holds)[0]])
+        place = np.array([enclose(margin)[0]])
         return np.asarray(self._between(origin, before, after, place)[0])

@@ -1,0 +1,90 @@
+"""Split a curve of one contact formation by stability class."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfplan_core.contact.formation import Formation
+from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.contact_model import Stability
+from cfplan_core.planning.bracketing import enclose
+from cfplan_core.planning.events import may_dip
+from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
+from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
+
+# Width, as a part of the interval between two points, to which a change of class is located.
+_WIDTH = 1e-6
+
+
+def split_by_class(
+    tracer: Tracer, formation: Formation, points: FloatArray
+) -> list[tuple[Stability, FloatArray]]:
+    """Cut a stable curve where form closure is won or lost.
+
+    Args:
+        tracer: Knows system and model.
+        formation: The contacts.
+        points: Shape (s, 3 + n), successive points on the formation's manifold.
+
+    Returns:
+        Classes with their points; neighbours share a point, which has form closure, by a hair.
+    """
+    points = _refined(tracer, formation, points)
+    closed = tracer.margins(formation, points).form_closure > STABILITY_MARGIN
+    parts = []
+    begin: list[FloatArray] = []
+    first = 0
+    for change in np.flatnonzero(np.diff(closed)):
+        edge = _boundary(tracer, formation, points[change], points[change + 1], closed[change])
+        parts.append((_name(closed[change]), [*begin, *points[first : change + 1], edge]))
+        begin, first = [edge], int(change) + 1
+    parts.append((_name(closed[-1]), [*begin, *points[first:]]))
+    return [(stability, np.array(part)) for stability, part in parts]
+
+
+def _name(closed: bool) -> Stability:
+    return Stability.FORM_CLOSURE if closed else Stability.FORCE_CLOSURE
+
+
+def _refined(tracer: Tracer, formation: Formation, points: FloatArray) -> FloatArray:
+    """Insert points where form closure may be won and lost, or lost and won, between two."""
+    margin = tracer.margins(formation, points).form_closure - STABILITY_MARGIN
+    grazing = np.flatnonzero(may_dip(margin, 0.0) | may_dip(-margin, 0.0))
+    if not len(grazing):
+        return points
+    intervals = sorted({i for graze in grazing for i in (int(graze), int(graze) + 1)})
+    fractions = np.arange(1, 8) / 8.0
+    for interval in reversed(intervals):
+        more = _between(tracer, formation, points[interval], points[interval + 1], fractions)
+        points = np.insert(points, interval + 1, more, axis=0)
+    return points
+
+
+def _boundary(
+    tracer: Tracer, formation: Formation, before: FloatArray, after: FloatArray, closed: bool
+) -> FloatArray:
+    """Locate the change between two points; the result has form closure."""
+
+    def margin(fractions: FloatArray) -> FloatArray:
+        points = _between(tracer, formation, before, after, fractions)
+        return tracer.margins(formation, points).form_closure - STABILITY_MARGIN
+
+    low, high = enclose(margin, _WIDTH)
+    place = np.array([low if closed else high])
+    return np.asarray(_between(tracer, formation, before, after, place)[0])
+
+
+def _between(
+    tracer: Tracer,
+    formation: Formation,
+    before: FloatArray,
+    after: FloatArray,
+    fractions: FloatArray,
+) -> FloatArray:
+    """Points of the manifold between two of its points."""
+    pairs = formation.array
+    gradients = tracer.gradients(before[None], pairs)[0]
+    rows = list(independent_rows(gradients))
+    basis = tangent_basis(gradients[rows])
+    guesses = before + fractions[:, None] * (after - before)
+    return project(tracer.system, pairs[rows], before, basis, guesses).points
