@@ -11,10 +11,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from cfplan_core.contact.system import IntArray
+from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 
 _PARALLEL = 1e-9
+_COPLANAR = 1e-9
 
 
 @lru_cache(maxsize=64)
@@ -43,12 +44,26 @@ def span_margin(vectors: FloatArray) -> FloatArray:
     return _margin(height, length)
 
 
-def span_margins(vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return `span_margin` of vectors of shape (s, k, 3) and of all of them but the last."""
+def span_margins(vectors: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Judge vectors, and all of them but the last.
+
+    Args:
+        vectors: Shape (s, k, 3).
+
+    Returns:
+        `span_margin` of all and of all but the last, each of shape (s,), and the signs of the
+        determinants of all triples, shape (s, m): where they do not change along a path, whether
+        the vectors span does not change either.
+    """
     height, length = _heights(vectors)
     count = vectors.shape[1]
     rest = _planes(count)[1] < count - 1
-    return _margin(height, length), _margin(height[:, rest, :-1], length[:, rest])
+    signs = np.concatenate([height > _COPLANAR, height < -_COPLANAR], axis=1)
+    return (
+        _margin(height, length),
+        _margin(height[:, rest, :-1], length[:, rest]),
+        signs.reshape(len(vectors), -1),
+    )
 
 
 def _heights(vectors: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -23,18 +23,20 @@ class Stability(str, Enum):
 
 
 class Margins(NamedTuple):
-    """Functions of the configuration, each of shape (s,), positive where a property holds.
+    """Functions of the configuration: how far it is from losing or winning stability.
 
-    They may be followed to the place where they change their sign, and form closure is never
-    without stability.
+    The margins may be followed to the place where they change their sign, and form closure is
+    never without stability.
 
     Attributes:
-        stable: First-order stability (force or form closure).
-        form_closure: Form closure.
+        stable: Shape (s,), positive where there is first-order stability.
+        form_closure: Shape (s,), positive where there is form closure.
+        signs: Shape (s, m): along a path on which they stay the same so do both verdicts.
     """
 
     stable: FloatArray
     form_closure: FloatArray
+    signs: BoolArray
 
 
 class Motion(NamedTuple):

@@ -60,9 +60,9 @@ class FrictionlessModel:
         vectors = np.empty((len(gradients), gradients.shape[1] + 1, 3))
         vectors[:, :-1] = gradients[..., :3]
         vectors[:, -1] = self.load
-        stable, form_closure = span_margins(vectors)
+        stable, form_closure, signs = span_margins(vectors)
         # Both are positive in form closure, but the load may make the margin smaller.
-        return Margins(np.maximum(stable, form_closure), form_closure)
+        return Margins(np.maximum(stable, form_closure), form_closure, signs)
 
     def torque_limits(self, gradients: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Minimum and maximum of τ_j over {c ≥ 0, W c = −f}, over its vertices and rays."""

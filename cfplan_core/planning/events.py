@@ -14,7 +14,7 @@ import numpy as np
 
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.gaps import gaps, wedge_lifts
-from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray, Placement
+from cfplan_core.contact.system import ContactSystem, IntArray, Placement
 from cfplan_core.geometry.polygon import FloatArray
 
 # Offsets at a crossing are interpolated: how far outside an edge one still gets a closer look.
@@ -209,29 +209,13 @@ def _first_graze(
     system: ContactSystem, gap: FloatArray, offset: FloatArray, kept: IntArray
 ) -> int:
     """First interval beside a sample whose gap is smallest and, interpolated, may be negative."""
-    grazes = may_dip(gap, _GRAZE)
-    inside = (offset[1:-1] > -_OFFSET_SLACK) & (
-        offset[1:-1] < system.pair_length + _OFFSET_SLACK
-    )
-    grazes &= inside
-    grazes[:, kept] = False
-    samples = np.flatnonzero(grazes.any(axis=1))
-    return int(samples[0]) if len(samples) else len(gap)
-
-
-def may_dip(values: FloatArray, below: float) -> BoolArray:
-    """Tell where a positive function may come below a value unseen, between samples.
-
-    Args:
-        values: Shape (s, ...), at successive samples.
-        below: The value.
-
-    Returns:
-        Shape (s - 2, ...): true at inner samples that are smallest and where the parabola through
-        the neighbours has a minimum below the value.
-    """
-    before, middle, after = values[:-2], values[1:-1], values[2:]
+    before, middle, after = gap[:-2], gap[1:-1], gap[2:]
     dips = (middle > 0.0) & (before > middle + _NEAR) & (after > middle + _NEAR)
     bend = np.where(dips, before - 2.0 * middle + after, 1.0)
     lowest = middle - 0.125 * (after - before) ** 2 / bend
-    return np.asarray(dips & (lowest < below))
+    inner = offset[1:-1]
+    inside = (inner > -_OFFSET_SLACK) & (inner < system.pair_length + _OFFSET_SLACK)
+    grazes = dips & (lowest < _GRAZE) & inside
+    grazes[:, kept] = False
+    samples = np.flatnonzero(grazes.any(axis=1))
+    return int(samples[0]) if len(samples) else len(gap)

@@ -8,10 +8,10 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.bracketing import enclose
-from cfplan_core.planning.events import may_dip
 from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
 
+_INNER = np.arange(1, 8) / 8.0
 # Width, as a part of the interval between two points, to which a change of class is located.
 _WIDTH = 1e-6
 
@@ -48,15 +48,15 @@ def _name(closed: bool) -> Stability:
 
 def _refined(tracer: Tracer, formation: Formation, points: FloatArray) -> FloatArray:
     """Insert points where form closure may be won and lost, or lost and won, between two."""
-    margin = tracer.margins(formation, points).form_closure - STABILITY_MARGIN
-    grazing = np.flatnonzero(may_dip(margin, 0.0) | may_dip(-margin, 0.0))
-    if not len(grazing):
-        return points
-    intervals = sorted({i for graze in grazing for i in (int(graze), int(graze) + 1)})
-    fractions = np.arange(1, 8) / 8.0
-    for interval in reversed(intervals):
-        more = _between(tracer, formation, points[interval], points[interval + 1], fractions)
-        points = np.insert(points, interval + 1, more, axis=0)
+    margins = tracer.margins(formation, points)
+    closed = margins.form_closure > STABILITY_MARGIN
+    turns = (margins.signs[1:] != margins.signs[:-1]).any(axis=1)
+    for interval in np.flatnonzero(turns & (closed[1:] == closed[:-1]))[::-1]:
+        ends = points[interval], points[interval + 1]
+        between = _between(tracer, formation, *ends, _INNER)
+        inner = tracer.margins(formation, between).form_closure > STABILITY_MARGIN
+        if (inner != closed[interval]).any():
+            points = np.insert(points, interval + 1, between, axis=0)
     return points
 
 

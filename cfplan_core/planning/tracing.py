@@ -26,7 +26,7 @@ from cfplan_core.contact.system import ContactSystem, IntArray, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Margins, Stability
 from cfplan_core.planning.bracketing import enclose
-from cfplan_core.planning.events import Candidate, EventKind, Sighting, may_dip, sight
+from cfplan_core.planning.events import Candidate, EventKind, sight
 from cfplan_core.planning.manifold import CONVERGED, independent_rows, project, tangent_basis
 
 # Margins below this count as lost: nothing is planned that is held by less.
@@ -35,6 +35,7 @@ STABILITY_MARGIN = 1e-6
 STEP = 0.04
 _STRETCH = 10
 _SMALLEST_STEP = 1e-7
+_INNER = np.array([0.25, 0.5, 0.75])
 LONGEST = 100.0
 
 # Chooses the motion from a configuration and the tangent basis there: a vector in the span of the
@@ -207,14 +208,10 @@ class _Pursuit:
         if self.fresh and self.departing and self._penetrates(samples[1:2]):
             return self._finish(EventKind.CONTACT, tuple(sorted(self.departing)))
         sighting = sight(self.system, self.formation, samples, placed, self.fresh)
-        stable = self.model.margins(gradients).stable - STABILITY_MARGIN
+        samples, stable = self._watch(samples, self.model.margins(gradients), sighting.interval)
         lost = int(np.argmax(stable[1:] <= 0.0)) if (stable[1:] <= 0.0).any() else len(stable)
         if self.fresh and lost == 0:
             return self._finish(EventKind.UNSTABLE)
-        if self.step > STEP / 100:
-            grazing = np.flatnonzero(may_dip(stable, 0.0))
-            if len(grazing) and grazing[0] < min(lost, sighting.interval):
-                sighting = Sighting(int(grazing[0]), (), True)
         if self.redundant:
             apart = np.abs(gaps(self.system, placed, self.contacts).gap).max(axis=1) > 1e-7
             if apart.any() and int(np.argmax(apart)) <= min(lost, sighting.interval):
@@ -237,6 +234,29 @@ class _Pursuit:
             self.step = min(2.0 * self.step, STEP)
         self.basis = self._next_basis()
         return None
+
+    def _watch(
+        self, samples: FloatArray, margins: Margins, last: int
+    ) -> tuple[FloatArray, FloatArray]:
+        """Look between samples, up to an interval, where stability may be lost and regained.
+
+        Returns:
+            The samples, cut behind a point that is not stable if there is one, and by how much
+            each is stable.
+        """
+        stable = margins.stable - STABILITY_MARGIN
+        turns = (margins.signs[1:] != margins.signs[:-1]).any(axis=1)
+        suspects = turns & (stable[1:] > 0.0) & (stable[:-1] > 0.0)
+        suspects[last + 1 :] = False
+        for interval in np.flatnonzero(suspects):
+            ends = samples[interval], samples[interval + 1]
+            between = self._between(samples[0], *ends, _INNER)
+            inner = self.model.margins(self._gradients(between, self.contacts)).stable
+            if (inner <= STABILITY_MARGIN).any():
+                first = int(np.argmax(inner <= STABILITY_MARGIN))
+                samples = np.concatenate([samples[: interval + 1], between[first : first + 1]])
+                return samples, np.append(stable[: interval + 1], -STABILITY_MARGIN)
+        return samples, stable
 
     def _take(self, samples: FloatArray) -> None:
         self.points.append(samples)

@@ -106,9 +106,7 @@ def test_edge_on_edge_is_two_contacts_wherever_they_overlap(
     apart = [abs(a - b) for a in (left, right) for b in (-0.02, 0.02)]
     if min(apart) < 1e-5 or right < -0.02:
         return
-    rotation = np.array(
-        [[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]
-    )
+    rotation = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
     palm = np.array(plate(left, right)) @ rotation
     expected = {
         'object.v0|palm.0.e2' if left < -0.02 else 'object.e0|palm.0.v3',
@@ -185,9 +183,7 @@ def test_reflex_vertex_touches_nothing() -> None:
         (0.02, 0.03),
         (-0.02, 0.03),
     ]
-    assert contacts(arch, [plate(-0.1, 0.1)]) == {
-        f'object.v{k}|palm.0.e2' for k in (0, 1, 3, 4)
-    }
+    assert contacts(arch, [plate(-0.1, 0.1)]) == {f'object.v{k}|palm.0.e2' for k in (0, 1, 3, 4)}
 
 
 def test_pin_in_a_notch_touches_both_sides_of_it_at_one_place() -> None:
@@ -308,7 +304,9 @@ def test_pin_on_an_edge_touches_that_edge_alone(
     along = (end - start) / np.linalg.norm(end - start)
     normal = np.array([along[1], -along[0]])
     tip = start + pin[1] * (end - start)
-    needle = np.array([tip, tip + 1e-3 * normal - 1e-5 * along, tip + 1e-3 * normal + 1e-5 * along])
+    needle = np.array(
+        [tip, tip + 1e-3 * normal - 1e-5 * along, tip + 1e-3 * normal + 1e-5 * along]
+    )
     c, s = math.cos(turn), math.sin(turn)
     world = needle @ np.array([[c, s], [-s, c]])
     system, z = placed(outline, [world.tolist()], (0.0, 0.0, turn))

@@ -145,7 +145,9 @@ def test_without_gravity_forces_are_in_newtons(rich_problem: Problem) -> None:
 
 def test_hand_without_joints_is_placed(rich_problem: Problem) -> None:
     grasp = Grasp((0.0, 0.0, 0.0), ())
-    still = ContactSystem(replace(rich_problem, hand=Hand(rich_problem.hand.palm, ()), start=grasp))
+    still = ContactSystem(
+        replace(rich_problem, hand=Hand(rich_problem.hand.palm, ()), start=grasp)
+    )
     assert still.place(still.configuration(grasp)[None]).vertices.shape == (1, 6 + 6 + 3)
 
 

@@ -113,9 +113,7 @@ def test_repeated_vector_does_not_change_the_verdict(rows: FloatArray, index: in
 def test_margin_does_not_depend_on_the_frame(rows: FloatArray, turn: float) -> None:
     c, s = np.cos(turn), np.sin(turn)
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    crosses = [
-        float(np.linalg.norm(np.cross(a, b))) for i, a in enumerate(rows) for b in rows[:i]
-    ]
+    crosses = [float(np.linalg.norm(np.cross(a, b))) for i, a in enumerate(rows) for b in rows[:i]]
     # Where vectors are all but parallel rounding decides which plane they span.
     assume(all(cross == 0.0 or cross > 1e-6 for cross in crosses))
     assume(min((cross for cross in crosses if cross > 0.0), default=0.0) > 0.0)
