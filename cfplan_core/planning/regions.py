@@ -72,6 +72,8 @@ class Regions:
             if len(rest) < 3:
                 continue
             holds = tracer.margins(rest, piece.points).stable > STABILITY_MARGIN
+            # More than this formation touches, or links meet, at the ends.
+            holds[0] = holds[-1] = False
             for middle in _middles(holds):
                 z = piece.points[middle]
                 heading = self._opening(rest, pair, z)

@@ -149,7 +149,7 @@ def material_velocity(
 def test_wrench_and_joint_columns_are_those_of_the_definition(
     rich: ContactSystem, z: FloatArray, first: int
 ) -> None:
-    """w = (n_x, n_y, r_x n_y - r_y n_x) and j_k = -n · ∂p/∂θ_k, n from the hand into the object."""
+    """w = (n_x, n_y, r_x n_y - r_y n_x), j_k = -n · ∂p/∂θ_k, n from the hand into the object."""
     polygons = bodies(rich, z)
     hand, palms = rich.problem.hand, len(rich.problem.hand.palm)
     pairs = np.arange(first, rich.contact_count, 23)

@@ -33,6 +33,10 @@ def turned(vertices: FloatArray, angle: float) -> FloatArray:
     return np.asarray(vertices @ np.array([[c, s], [-s, c]]))
 
 
+def shifted(vertices: FloatArray, x: float, y: float) -> FloatArray:
+    return vertices + np.array([x, y])
+
+
 def upright(width: float, height: float) -> FloatArray:
     return SQUARE * [width, height] - [0.5 * width, 0.5 * height]
 
@@ -112,21 +116,23 @@ def test_overlap_does_not_depend_on_the_frame(a: FloatArray, b: FloatArray, turn
 @settings(max_examples=50)
 @given(depth=st.floats(1e-9, 1e-2), turn=st.floats(-3.0, 3.0))
 def test_corner_is_as_deep_as_its_vertex(depth: float, turn: float) -> None:
-    diamond = turned(SQUARE, math.pi / 4) + [0.5, 1.0 - depth]
+    diamond = shifted(turned(SQUARE, math.pi / 4), 0.5, 1.0 - depth)
     found = penetration_depth(turned(SQUARE, turn), turned(diamond, turn))
     assert found == pytest.approx(depth, abs=1e-12)
 
 
 @pytest.mark.parametrize('depth', [1e-7, 1e-4, 1e-2])
 def test_sliver_between_flush_edges_is_as_deep_as_thick(depth: float) -> None:
-    assert penetration_depth(SQUARE, SQUARE + [0.3, 1.0 - depth]) == pytest.approx(depth, rel=1e-6)
+    assert penetration_depth(SQUARE, shifted(SQUARE, 0.3, 1.0 - depth)) == pytest.approx(
+        depth, rel=1e-6
+    )
 
 
 @pytest.mark.parametrize(
     'shift', [(0.3, 1.0), (1.0, 0.0), (1.0, 1.0), (1.0, -1.0), (3.0, 0.0), (0.0, -1.0)]
 )
 def test_polygons_that_touch_or_are_apart_do_not_overlap(shift: tuple[float, float]) -> None:
-    assert penetration_depth(SQUARE, SQUARE + shift) == 0.0
+    assert penetration_depth(SQUARE, shifted(SQUARE, *shift)) == 0.0
 
 
 @settings(max_examples=50)
@@ -138,7 +144,7 @@ def test_polygons_that_touch_or_are_apart_do_not_overlap(shift: tuple[float, flo
 def test_flush_edges_in_any_direction_overlap_by_rounding_alone(
     turn: float, slide: float, scale: float
 ) -> None:
-    above = SQUARE + [slide, 1.0]
+    above = shifted(SQUARE, slide, 1.0)
     depth = penetration_depth(scale * turned(SQUARE, turn), scale * turned(above, turn))
     assert depth <= 1e-15 * scale
 
@@ -165,12 +171,12 @@ def test_polygons_with_shared_edges_overlap() -> None:
 
 
 def test_plug_in_a_cup_of_its_width_does_not_overlap() -> None:
-    assert penetration_depth(CUP, SQUARE + [1.0, 1.0]) == 0.0
+    assert penetration_depth(CUP, shifted(SQUARE, 1.0, 1.0)) == 0.0
 
 
 def test_plug_in_the_wall_of_a_cup_is_as_deep_as_the_middle_of_its_end() -> None:
     """0.1 m into the left wall: its end runs along in 0.9 m, with a corner 0.1 m deep."""
-    assert penetration_depth(CUP, SQUARE + [0.9, 1.0]) == pytest.approx(0.1)
+    assert penetration_depth(CUP, shifted(SQUARE, 0.9, 1.0)) == pytest.approx(0.1)
 
 
 def test_bar_through_the_notch_of_a_cup_overlaps_in_both_walls() -> None:

@@ -32,7 +32,7 @@ def vectors(draw: st.DrawFn) -> FloatArray:
         x, y, z = rows[index]
         rows.append((sign * x, sign * y, sign * z))
     noise = np.random.default_rng(draw(st.integers(0, 1000))).normal(size=(len(rows), 3))
-    return np.array(rows) + draw(st.sampled_from([0.0, 0.0, 1e-9, 1e-5, 1e-3])) * noise
+    return np.array(rows) + draw(st.sampled_from([0.0, 0.0, 1e-5, 1e-3])) * noise
 
 
 def margin(rows: FloatArray) -> float:

@@ -60,7 +60,7 @@ def block(
     hand = Hand(tuple(palms), tuple(fingers))
     grasp = Grasp(pose, np.zeros(len(hand.joints)) if joints is None else joints)
     thing = ManipulatedObject(BLOCK, 0.1)
-    anything = Goal(joints={name: 0.0 for name in hand.joint_names[:1]})
+    anything = Goal(joints=dict.fromkeys(hand.joint_names[:1], 0.0))
     return Problem('block', (0.0, -9.81), hand, thing, friction, grasp, goal or anything)
 
 
