@@ -1,4 +1,4 @@
-"""The exceptions of cfplan: one family, whose messages say what was expected, what came, and where."""
+"""The exceptions of cfplan: one family; messages say what was expected, what came, and where."""
 
 from __future__ import annotations
 

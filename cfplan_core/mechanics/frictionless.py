@@ -82,7 +82,7 @@ class FrictionlessModel:
         w, j = gradients[..., :3], gradients[..., 3:]
         torques, feasible = self._equilibria(w, j)
         within = (torques >= lower[:, None]) & (torques <= upper[:, None])
-        holds = (feasible & within.all(axis=-1)).any(axis=1)
+        holds = np.asarray((feasible & within.all(axis=-1)).any(axis=1))
         for index in np.flatnonzero(~holds):
             from scipy.optimize import linprog  # Costs half a second to import.
 
@@ -96,7 +96,7 @@ class FrictionlessModel:
                 b_eq=-self.load,
             )
             holds[index] = found.status == 0
-        return np.asarray(holds)
+        return holds
 
     def _equilibria(self, w: FloatArray, j: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Torques at the basic solutions of W c = −f, and which of them have c ≥ 0.

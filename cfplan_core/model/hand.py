@@ -178,4 +178,4 @@ class Hand:
 def transformed(vertices: FloatArray, origin: FloatArray, angle: float) -> FloatArray:
     """Place body-fixed points: rotate by an angle (rad), then shift by an origin (m)."""
     c, s = np.cos(angle), np.sin(angle)
-    return vertices @ np.array([[c, s], [-s, c]]) + origin
+    return np.asarray(vertices @ np.array([[c, s], [-s, c]]) + origin)

@@ -37,7 +37,7 @@ class ManipulatedObject:
         return diameter(self.vertices)
 
     def world_vertices(self, object_pose: FloatArray) -> FloatArray:
-        """Vertices in the world frame, shape (v, 2), m, for a pose (x, y, φ) of the object frame."""
+        """World vertices, shape (v, 2), m, for a pose (x, y, φ) of the object's frame."""
         return transformed(self.vertices, object_pose[:2], float(object_pose[2]))
 
 

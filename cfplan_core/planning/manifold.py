@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cfplan_core.contact.gaps import gap_gradients, gaps
-from cfplan_core.contact.system import ContactSystem, IntArray
+from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 
 # Gradients of gaps have rows of size one: below this a row counts as dependent on others.
@@ -33,7 +33,7 @@ class Projected(NamedTuple):
 
     points: FloatArray
     gradients: FloatArray
-    converged: FloatArray
+    converged: BoolArray
 
 
 def independent_rows(gradients: FloatArray) -> tuple[int, ...]:

@@ -16,6 +16,7 @@ import numpy as np
 
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.gaps import gap_gradients
+from cfplan_core.contact.system import BoolArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.events import OPEN_EVENTS, EventKind
@@ -209,9 +210,7 @@ class Regions:
             for piece in self._entered(region, trace.end, heading):
                 yield trace.end, piece
 
-    def _entered(
-        self, region: Region, z: FloatArray, heading: FloatArray
-    ) -> Iterator[Piece]:
+    def _entered(self, region: Region, z: FloatArray, heading: FloatArray) -> Iterator[Piece]:
         """Pieces that a ray of a region runs into at an event."""
         roadmap = self._roadmap
         junction = roadmap.junction(z)
@@ -233,7 +232,7 @@ class Regions:
                 yield entered
 
 
-def _middles(holds: FloatArray) -> list[int]:
+def _middles(holds: BoolArray) -> list[int]:
     """Middle index of every run of true values."""
     bounds = np.flatnonzero(np.diff(np.concatenate([[0], holds.astype(int), [0]])))
     return [int(a + b - 1) // 2 for a, b in zip(bounds[::2], bounds[1::2], strict=True)]

@@ -79,8 +79,10 @@ class Roadmap:
         known = self._on_curve(junction.formation, z)
         if known is not None:
             return known
-        ways = [Departure(junction.formation, sign * basis[0], frozenset()) for sign in (1.0, -1.0)]
-        ahead, behind = (self._follow(z, way) for way in ways)
+        ahead, behind = (
+            self._follow(z, Departure(junction.formation, tangent, frozenset()))
+            for tangent in (basis[0], -basis[0])
+        )
         points = np.concatenate([behind.points[:0:-1], ahead.points])
         ends = (self._end(behind), self._end(ahead))
         pieces = self._add_curve(junction.formation, points, ends)
@@ -149,9 +151,7 @@ class Roadmap:
     def _ways(self, junction: Junction) -> list[Departure]:
         if junction.ways is None:
             assert junction.around is not None
-            junction.ways = departures(
-                junction.around, self.model, self.system.dof, self.failures
-            )
+            junction.ways = departures(junction.around, self.model, self.system.dof, self.failures)
         return junction.ways
 
     def _behind(self, junction: Junction) -> Iterator[Piece | None]:
@@ -183,7 +183,7 @@ class Roadmap:
 
         def steer(_: FloatArray, basis: FloatArray) -> FloatArray:
             nonlocal heading
-            heading = basis[0] if basis[0] @ heading > 0.0 else -basis[0]
+            heading = np.asarray(np.copysign(1.0, basis[0] @ heading) * basis[0])
             return heading
 
         return self.tracer.follow(departure.formation, z, steer, departure.departing)

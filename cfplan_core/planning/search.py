@@ -117,7 +117,7 @@ class Search:
         self._test: GoalTest | None = None
         if isinstance(goal, GoalTest):
             self._test = goal
-            self._roots = self.trees[:1]
+            self._roots: tuple[Tree, ...] = self.trees[:1]
         else:
             self.trees = (Tree(start), Tree(goal))
             self._roots = self.trees

@@ -187,9 +187,7 @@ class _Pursuit:
             if self.fresh:
                 # A short first step shows what holds just behind the start.
                 steps = np.concatenate([[0.02 * steps[0]], steps])
-            found = project(
-                self.system, self.rows, z, self.basis, z + steps[:, None] * direction
-            )
+            found = project(self.system, self.rows, z, self.basis, z + steps[:, None] * direction)
             samples = np.concatenate([z[None], found.points])
             change = np.abs(np.diff(samples, axis=0)).max(axis=1)
             smooth = found.converged & (change < 1.5 * self.step)
@@ -289,8 +287,8 @@ class _Pursuit:
 
         located: list[tuple[float, FloatArray, EventKind, int]] = []
         if unstable:
-            z = self._locate_loss(samples[0], before, after)
-            located.append((along(z), z, EventKind.UNSTABLE, -1))
+            edge = self._locate_loss(samples[0], before, after)
+            located.append((along(edge), edge, EventKind.UNSTABLE, -1))
         tried: set[tuple[EventKind, int]] = set()
         while candidates:
             for candidate in candidates:
@@ -300,7 +298,7 @@ class _Pursuit:
                     located.append((along(z), z, candidate.kind, candidate.index))
             if not located:
                 break
-            # A gap may have closed and, where its vertex left the edge, opened within the interval.
+            # A gap may have closed and, beyond the edge of its contact, opened again before.
             _, after, _, _ = min(located, key=lambda item: item[0])
             both = np.stack([before, after])
             sighting = sight(
@@ -412,7 +410,8 @@ class _Pursuit:
             slack = 1e-6 + 0.01 * (high - low)
             return low - slack <= at <= high + slack
 
-        z = self._newton(candidate, before + candidate.fraction * (after - before), origin, direction)
+        guess = before + candidate.fraction * (after - before)
+        z = self._newton(candidate, guess, origin, direction)
         if between(z):
             return z
         # Another root, or contacts that become dependent just there: enclose it.

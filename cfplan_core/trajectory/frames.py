@@ -34,9 +34,7 @@ class Frames:
     segments: tuple[Segment, ...]
 
 
-def overloaded_legs(
-    system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
-) -> list[int]:
+def overloaded_legs(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> list[int]:
     """Tell which legs no torques within the joints' effort limits can hold, by index."""
     effort = np.array([joint.effort_limit for joint in system.problem.hand.joints])
     effort = effort / (system.force_unit * system.size)
@@ -120,16 +118,14 @@ def _evenly(system: ContactSystem, leg: Leg) -> FloatArray:
         points = np.insert(points, large + 1, middles, axis=0)
 
 
-def _between(
-    system: ContactSystem, leg: Leg, before: FloatArray, after: FloatArray
-) -> FloatArray:
+def _between(system: ContactSystem, leg: Leg, before: FloatArray, after: FloatArray) -> FloatArray:
     """The point of a formation's manifold half way between two neighbours."""
     pairs = leg.formation.array
     gradients = gap_gradients(system, system.place(before[None]), pairs)[0]
     rows = list(independent_rows(gradients))
     basis = tangent_basis(gradients[rows])
     middle = 0.5 * (before + after)
-    return project(system, pairs[rows], before, basis, middle[None]).points[0]
+    return np.asarray(project(system, pairs[rows], before, basis, middle[None]).points[0])
 
 
 def _torque_limits(
