@@ -23,7 +23,9 @@ def penetration_depth(a: FloatArray, b: FloatArray) -> float:
     """
     if (a.max(axis=0) < b.min(axis=0)).any() or (b.max(axis=0) < a.min(axis=0)).any():
         return 0.0
-    return max(_reach(a, b), _reach(b, a))
+    # All but parallel edges: what overflows lies off both.
+    with np.errstate(over='ignore', invalid='ignore'):
+        return max(_reach(a, b), _reach(b, a))
 
 
 def _reach(a: FloatArray, b: FloatArray) -> float:

@@ -87,7 +87,6 @@ def sight(
     formation: Formation,
     z: FloatArray,
     placed: Placement,
-    fresh: bool,
 ) -> Sighting:
     """Find the first interval in which geometry ends a motion.
 
@@ -96,12 +95,11 @@ def sight(
         formation: The contacts that are kept.
         z: Shape (s, 3 + n), successive configurations.
         placed: The features at z.
-        fresh: True if gaps that are zero at the first sample are about to open.
     """
     gap, offset = gaps(system, placed, slice(None))
     found: list[tuple[int, Candidate]] = []
     kept = formation.array
-    found += _closing_gaps(system, gap, offset, kept, fresh)
+    found += _closing_gaps(system, gap, offset, kept)
     found += _edge_ends(system, offset[:, kept], kept)
     found += _flush_edges(system, placed, kept)
     found += _joint_limits(system, z)
@@ -117,12 +115,9 @@ def _closing_gaps(
     gap: FloatArray,
     offset: FloatArray,
     kept: IntArray,
-    fresh: bool,
 ) -> list[tuple[int, Candidate]]:
-    """Gaps that go from positive to zero or below within their edge."""
-    closes = (gap[:-1] > 0.0) & (gap[1:] <= 0.0)
-    if fresh:
-        closes[0, np.abs(gap[0]) < _NEAR] = False
+    """Gaps that close within their edge; those that are closed at the first sample open."""
+    closes = (gap[:-1] > _NEAR) & (gap[1:] <= _NEAR)
     closes[:, kept] = False
     if not closes.any():
         return []

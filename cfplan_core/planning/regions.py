@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import BoolArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.events import OPEN_EVENTS, EventKind
 from cfplan_core.planning.manifold import independent_rows, tangent_basis
-from cfplan_core.planning.pieces import Piece, Region
+from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Trace, classify
+from cfplan_core.planning.transitions import crossings
 
 if TYPE_CHECKING:
     from cfplan_core.planning.roadmap import Roadmap
@@ -195,19 +195,15 @@ class Regions:
                 if len(parts) > 1:
                     edge = parts[0][1]
                     region.links.append((edge[-1], edge))
-                    heading = edge[-1] - edge[-2]
-                    heading = heading / np.linalg.norm(heading)
-                    beyond = self._enter(region.formation, edge[-1], heading, frozenset())
+                    beyond = self._enter(region.formation, edge[-1], _heading(edge), frozenset())
                     if beyond is not None and beyond is not region:
                         yield edge[-1], beyond
                     continue
-            if trace.kind not in OPEN_EVENTS or len(trace.points) < 2:
+            if trace.kind not in OPEN_EVENTS or np.abs(trace.end - region.anchor).max() < SAME:
                 roadmap.failures[trace.kind.value] += 1
                 continue
             region.links.append((trace.end, trace.points))
-            heading = trace.points[-1] - trace.points[-2]
-            heading = heading / np.linalg.norm(heading)
-            for piece in self._entered(region, trace.end, heading):
+            for piece in self._entered(region, trace.end, _heading(trace.points)):
                 yield trace.end, piece
 
     def _entered(self, region: Region, z: FloatArray, heading: FloatArray) -> Iterator[Piece]:
@@ -219,15 +215,10 @@ class Regions:
         ):
             yield roadmap.root(z)
             return
-        for formation in _alternatives(junction.formation, region.formation):
-            if junction.around is None or junction.around.keeps_vertex(formation.pairs):
-                continue
-            gradients = gap_gradients(
-                roadmap.system, roadmap.system.place(z[None]), formation.array
-            )
-            if not roadmap.model.margins(gradients).stable[0] > STABILITY_MARGIN:
-                continue
-            entered = self._enter(formation, z, heading, frozenset())
+        if junction.around is None:
+            return
+        for way in crossings(junction.around, roadmap.model, heading, roadmap.failures):
+            entered = self._enter(way.formation, z, way.direction, way.departing)
             if entered is not None and entered is not region:
                 yield entered
 
@@ -238,15 +229,12 @@ def _middles(holds: BoolArray) -> list[int]:
     return [int(a + b - 1) // 2 for a, b in zip(bounds[::2], bounds[1::2], strict=True)]
 
 
-def _alternatives(touching: Formation, kept: Formation) -> list[Formation]:
-    """Formations of as many touching contacts as are kept that differ in one of them at most."""
-    new = [pair for pair in touching.pairs if pair not in kept]
-    swapped = [
-        Formation(tuple(sorted(pair if p == old else p for p in kept.pairs)))
-        for old in kept.pairs
-        for pair in new
-    ]
-    return [kept, *swapped]
+def _heading(points: FloatArray) -> FloatArray:
+    """Unit vector towards the last point from the last one that is not the same."""
+    steps = points[-1] - points[:-1]
+    length = np.linalg.norm(steps, axis=1)
+    last = int(np.flatnonzero(length > SAME)[-1])
+    return np.asarray(steps[last] / length[last])
 
 
 def _directions(dimension: int) -> FloatArray:

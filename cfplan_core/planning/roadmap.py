@@ -151,7 +151,7 @@ class Roadmap:
     def _ways(self, junction: Junction) -> list[Departure]:
         if junction.ways is None:
             assert junction.around is not None
-            junction.ways = departures(junction.around, self.model, self.system.dof, self.failures)
+            junction.ways = departures(junction.around, self.model, self.failures)
         return junction.ways
 
     def _behind(self, junction: Junction) -> Iterator[Piece | None]:

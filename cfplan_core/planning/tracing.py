@@ -205,7 +205,7 @@ class _Pursuit:
         gradients = gap_gradients(self.system, placed, self.contacts)
         if self.fresh and self.departing and self._penetrates(samples[1:2]):
             return self._finish(EventKind.CONTACT, tuple(sorted(self.departing)))
-        sighting = sight(self.system, self.formation, samples, placed, self.fresh)
+        sighting = sight(self.system, self.formation, samples, placed)
         samples, stable = self._watch(samples, self.model.margins(gradients), sighting.interval)
         lost = int(np.argmax(stable[1:] <= 0.0)) if (stable[1:] <= 0.0).any() else len(stable)
         if self.fresh and lost == 0:
@@ -301,9 +301,7 @@ class _Pursuit:
             # A gap may have closed and, beyond the edge of its contact, opened again before.
             _, after, _, _ = min(located, key=lambda item: item[0])
             both = np.stack([before, after])
-            sighting = sight(
-                self.system, self.formation, both, self.system.place(both), self.fresh
-            )
+            sighting = sight(self.system, self.formation, both, self.system.place(both))
             candidates = tuple(c for c in sighting.candidates if (c.kind, c.index) not in tried)
         self._take(samples[1 : interval + 1])
         if not located:

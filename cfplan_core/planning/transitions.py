@@ -8,6 +8,7 @@ lie at one place (a vertex on a vertex), if the kept one moves into its edge.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -19,12 +20,14 @@ from cfplan_core.contact.gaps import gap_gradients, gaps, offset_gradients
 from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel
-from cfplan_core.planning.manifold import RANK_TOLERANCE, independent_rows
+from cfplan_core.planning.manifold import RANK_TOLERANCE
 from cfplan_core.planning.tracing import STABILITY_MARGIN
 
 # Contacts are located to 1e-11: what is nearer than this touches.
 TOUCH = 1e-8
 _STILL = 1e-7
+# Part of a heading that must lie in a formation's tangent space.
+_OBLIQUE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +71,6 @@ class Surroundings:
         """True if a vertex lies on a vertex."""
         return bool(self.together.any())
 
-    def keeps_vertex(self, pairs: tuple[int, ...]) -> bool:
-        """True if two of some touching contacts lie at one place."""
-        chosen = np.isin(self.pairs, pairs)
-        return bool(self.together[np.ix_(chosen, chosen)].any())
-
 
 def surroundings(system: ContactSystem, z: FloatArray) -> Surroundings:
     """Detect what touches at z, shape (3 + n,)."""
@@ -94,65 +92,86 @@ def surroundings(system: ContactSystem, z: FloatArray) -> Surroundings:
 
 
 def departures(
-    around: Surroundings, model: ContactModel, dof: int, failures: Counter[str]
+    around: Surroundings, model: ContactModel, failures: Counter[str]
 ) -> list[Departure]:
     """List the one-dimensional formations that lead out of a configuration.
 
     Args:
         around: From `surroundings`.
         model: Judges stability.
-        dof: 3 + n.
         failures: Counts why others do not.
 
     Returns:
         In the order of their contacts.
     """
-    count = len(around.pairs)
     found = []
-    for size in range(dof - 1, count + 1):
-        subsets = [
-            kept
-            for kept in combinations(range(count), size)
-            if not around.together[np.ix_(kept, kept)].any()
-        ]
-        if not subsets:
-            continue
-        gradients = around.gradients[np.array(subsets)]
-        _, singular, right = np.linalg.svd(gradients)
-        curves = (singular > RANK_TOLERANCE).sum(axis=1) == dof - 1
-        stable = model.margins(gradients).stable > STABILITY_MARGIN
-        failures['unstable contact formation'] += int((curves & ~stable).sum())
-        for k in np.flatnonzero(curves & stable):
-            found += _leaving(around, subsets[k], right[k, -1], failures)
+    for kept, basis in _stable_formations(around, model, failures, 1, 1):
+        for tangent in (basis[0], -basis[0]):
+            found += _departure(around, kept, tangent, failures)
     return found
 
 
-def _leaving(
-    around: Surroundings, kept: tuple[int, ...], tangent: FloatArray, failures: Counter[str]
+def crossings(
+    around: Surroundings, model: ContactModel, heading: FloatArray, failures: Counter[str]
 ) -> list[Departure]:
-    """Directions along a formation's tangent in which it can be left for."""
-    keep = list(kept)
-    others = [i for i in range(len(around.pairs)) if i not in kept]
-    opening = [i for i in others if not around.together[i, keep].any()]
-    rates = around.gradients[opening] @ tangent
-    still = [i for i, rate in zip(opening, rates, strict=True) if abs(rate) < _STILL]
-    if still:
-        rank = len(independent_rows(around.gradients[keep]))
-        if len(independent_rows(around.gradients[[*keep, *still]])) == rank:
-            # These contacts stay: the larger formation is the one that leads on.
-            return []
-    inward = around.inward[keep] @ tangent
-    if (np.abs(inward[around.at_end[keep]]) < _STILL).any():
+    """List the formations of dimension two and more that a heading leads into.
+
+    Args:
+        around: From `surroundings`.
+        model: Judges stability.
+        heading: Unit vector, shape (3 + n,); each formation is entered along its projection.
+        failures: Counts why others are not entered.
+    """
+    found = []
+    for kept, basis in _stable_formations(around, model, failures, 2, len(heading)):
+        ahead = basis.T @ (basis @ heading)
+        length = float(np.linalg.norm(ahead))
+        if length > _OBLIQUE:
+            found += _departure(around, kept, ahead / length, failures)
+    return found
+
+
+def _stable_formations(
+    around: Surroundings, model: ContactModel, failures: Counter[str], least: int, most: int
+) -> Iterator[tuple[list[int], FloatArray]]:
+    """Stable subsets of the touching contacts of some dimensions, with tangent bases."""
+    count, dof = around.gradients.shape
+    for size in range(3, count + 1):
+        subsets = np.array(list(combinations(range(count), size)), dtype=np.intp)
+        if dof - size > most:
+            continue
+        gradients = around.gradients[subsets]
+        _, singular, right = np.linalg.svd(gradients)
+        dimension = dof - (singular > RANK_TOLERANCE).sum(axis=1)
+        fits = (dimension >= least) & (dimension <= most)
+        stable = model.margins(gradients).stable > STABILITY_MARGIN
+        failures['unstable contact formation'] += int((fits & ~stable).sum())
+        for k in np.flatnonzero(fits & stable):
+            yield [int(i) for i in subsets[k]], right[k, dof - dimension[k] :]
+
+
+def _departure(
+    around: Surroundings, kept: list[int], direction: FloatArray, failures: Counter[str]
+) -> list[Departure]:
+    """Return the departure along a direction of a formation, in a list, if it is possible."""
+    inward = around.inward @ direction
+    if (np.abs(inward[kept])[around.at_end[kept]] < _STILL).any():
         failures['a vertex would be held on a vertex'] += 1
         return []
-    pairs = tuple(int(around.pairs[i]) for i in keep)
-    leaving = frozenset(int(around.pairs[i]) for i in opening)
-    found = []
-    for sign in (1.0, -1.0):
-        if (sign * rates < -_STILL).any():
-            failures['a contact would penetrate'] += 1
-        elif (sign * inward < -_STILL).any():
-            failures['a contact would leave its edge'] += 1
-        else:
-            found.append(Departure(Formation(pairs), sign * tangent, leaving))
-    return found
+    if (inward[kept] < 0.0).any():
+        failures['a contact would leave its edge'] += 1
+        return []
+    beside = around.together[:, kept].any(axis=1)
+    opening = [i for i in range(len(around.pairs)) if i not in kept and not beside[i]]
+    rates = around.gradients[opening] @ direction
+    if (rates < -_STILL).any():
+        failures['a contact would penetrate'] += 1
+        return []
+    # A gap that stays as it is closes nothing where the vertex slides off the end of the edge.
+    if any(rate < _STILL and inward[i] > -_STILL for i, rate in zip(opening, rates, strict=True)):
+        failures['a contact would stay'] += 1
+        return []
+    leaving = frozenset(
+        int(around.pairs[i]) for i, rate in zip(opening, rates, strict=True) if rate >= _STILL
+    )
+    return [Departure(Formation(tuple(int(i) for i in around.pairs[kept])), direction, leaving)]

@@ -189,3 +189,9 @@ def test_edge_along_the_rim_of_a_notch_and_into_the_wall_overlaps() -> None:
     """The lower edge runs flush on the notch's floor, then below it, into the wall."""
     slab = np.array([(1.2, 1.0), (2.6, 1.0), (2.6, 1.5), (1.2, 1.5)])
     assert penetration_depth(CUP, slab) == pytest.approx(0.5, abs=0.11)
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('turn', [1e-310, 1e-200, 1e-17])
+def test_edges_that_are_all_but_parallel_overlap_without_a_warning(turn: float) -> None:
+    assert penetration_depth(SQUARE, turned(shifted(SQUARE, 0.5, 0.0), turn)) == pytest.approx(0.5)

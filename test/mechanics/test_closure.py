@@ -109,6 +109,18 @@ def test_repeated_vector_does_not_change_the_verdict(rows: FloatArray, index: in
     assert (again > ROUNDING) == (found > 0.0)
 
 
+@given(rows=vectors(), seed=st.integers(0, 1000))
+def test_disturbance_at_the_level_of_rounding_does_not_change_a_clear_verdict(
+    rows: FloatArray, seed: int
+) -> None:
+    """Also where it turns a parallel pair of vectors, passed over, into one that is not."""
+    found = margin(rows)
+    assume(abs(found) > 0.01)
+    noise = np.random.default_rng(seed).normal(size=rows.shape)
+    for size in (1e-14, 1e-11, 1e-9, 1e-8):
+        assert (margin(rows + size * noise) > 0.0) == (found > 0.0)
+
+
 @given(rows=vectors(), turn=st.floats(-3.0, 3.0))
 def test_margin_does_not_depend_on_the_frame(rows: FloatArray, turn: float) -> None:
     c, s = np.cos(turn), np.sin(turn)
