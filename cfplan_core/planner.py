@@ -117,7 +117,7 @@ class _Planning:
         except _BudgetExhaustedError as stop:
             return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
         if frames is None:
-            return self._answer(Status.INFEASIBLE, f'no path; {self._explored()}')
+            return self._answer(Status.INFEASIBLE, f'no path; {self._explored()}{self._doubt()}')
         return replace(
             self._answer(Status.SOLVED, ''),
             times=frames.times,
@@ -169,6 +169,16 @@ class _Planning:
         return (
             f'explored {self.roadmap.formations()} contact formations by '
             f'{self.roadmap.attempts} transitions; most frequent failures: {failures or "none"}'
+        )
+
+    def _doubt(self) -> str:
+        """How far an answer of no path is short of a proof."""
+        regions = sum(piece.dimension > 1 for piece in self.roadmap.pieces)
+        if not regions:
+            return ''
+        return (
+            '. Contact formations of dimension 0 and 1 were searched completely, '
+            f'{regions} regions of dimension 2 and more only along rays'
         )
 
     def _answer(self, status: Status, message: str) -> PlanResult:

@@ -10,6 +10,7 @@ for points and curves, and only that far for regions.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import combinations, islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,12 +24,13 @@ from cfplan_core.planning.manifold import independent_rows, tangent_basis
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Trace, classify
-from cfplan_core.planning.transitions import crossings
+from cfplan_core.planning.transitions import Departure, crossings
 
 if TYPE_CHECKING:
     from cfplan_core.planning.roadmap import Roadmap
 
-# Rays from an anchor: directions in the plane for dimension two, as many for each further one.
+# Rays from an anchor: directions in the plane for dimension two, as many for each further one;
+# and choices of joints to hold still.
 _RAYS = 12
 # How far, in radians and object sizes, an entry is followed to find an anchor.
 _DEPTH = 0.4
@@ -80,7 +82,7 @@ class Regions:
                 heading = self._opening(rest, pair, z)
                 if heading is None:
                     continue
-                region = self._enter(rest, z, heading, frozenset({pair}))
+                region = self._enter(z, Departure(rest, heading, frozenset({pair})))
                 if region is not None:
                     yield z, region
 
@@ -96,21 +98,15 @@ class Regions:
         steepness = float(np.linalg.norm(slope))
         return None if steepness < STABILITY_MARGIN else slope @ basis / steepness
 
-    def _enter(
-        self,
-        formation: Formation,
-        z: FloatArray,
-        heading: FloatArray,
-        departing: frozenset[int],
-    ) -> Region | None:
+    def _enter(self, z: FloatArray, way: Departure) -> Region | None:
         """Follow a heading into a region and return it; None if it ends at once."""
-        trace = self._ray(formation, z, heading, departing, _DEPTH)
+        trace = self._ray(z, way, _DEPTH)
         self._roadmap.attempts += 1
         if len(trace.points) < 3:
             self._roadmap.failures[f'at once, {trace.kind.value}'] += 1
             return None
-        points = split_by_class(self._roadmap.tracer, formation, trace.points)[0][1]
-        return self._merge(formation, z, points[: len(points) // 2 + 1])
+        points = split_by_class(self._roadmap.tracer, way.formation, trace.points)[0][1]
+        return self._merge(way.formation, z, points[: len(points) // 2 + 1])
 
     def _merge(self, formation: Formation, z: FloatArray, inward: FloatArray) -> Region | None:
         """Find or make the region that points from z lead into."""
@@ -162,13 +158,13 @@ class Regions:
 
     def _ray(
         self,
-        formation: Formation,
         z: FloatArray,
-        heading: FloatArray,
-        departing: frozenset[int],
+        departure: Departure,
         longest: float,
+        held: tuple[int, ...] = (),
     ) -> Trace:
         """Follow a heading, kept as straight as the manifold allows."""
+        heading = departure.direction
 
         def steer(_: FloatArray, basis: FloatArray) -> FloatArray | None:
             nonlocal heading
@@ -179,48 +175,67 @@ class Regions:
             heading = ahead / length
             return heading
 
-        return self._roadmap.tracer.follow(formation, z, steer, departing, longest)
+        return self._roadmap.tracer.follow(
+            departure.formation, z, steer, departure.departing, longest, held
+        )
 
     def _shoot(self, region: Region) -> Iterator[tuple[FloatArray, Piece]]:
         roadmap = self._roadmap
-        gradients = roadmap.tracer.gradients(region.points, region.formation.array)[0]
-        basis = tangent_basis(gradients[list(independent_rows(gradients))])
-        for direction in _directions(len(basis)):
-            trace = self._ray(
-                region.formation, region.anchor, direction @ basis, frozenset(), np.pi
-            )
+        for heading, held in self._headings(region):
             roadmap.attempts += 1
-            if len(trace.points) > 1:
-                parts = split_by_class(roadmap.tracer, region.formation, trace.points)
-                if len(parts) > 1:
-                    edge = parts[0][1]
-                    region.links.append((edge[-1], edge))
-                    beyond = self._enter(region.formation, edge[-1], _heading(edge), frozenset())
-                    if beyond is not None and beyond is not region:
-                        yield edge[-1], beyond
-                    continue
-            if trace.kind not in OPEN_EVENTS or np.abs(trace.end - region.anchor).max() < SAME:
+            ray = Departure(region.formation, heading, frozenset())
+            trace = self._ray(region.anchor, ray, np.pi, held)
+            (_, points), *others = split_by_class(roadmap.tracer, region.formation, trace.points)
+            end = points[-1]
+            if np.abs(end - region.anchor).max() < SAME:
+                roadmap.failures[f'at once, {trace.kind.value}'] += 1
+                continue
+            if others:
+                ways = [Departure(region.formation, _heading(points), frozenset())]
+            elif trace.kind in OPEN_EVENTS:
+                ways = self._ways(region, end, _heading(points))
+            else:
                 roadmap.failures[trace.kind.value] += 1
                 continue
-            region.links.append((trace.end, trace.points))
-            for piece in self._entered(region, trace.end, _heading(trace.points)):
-                yield trace.end, piece
+            region.links.append((end, points))
+            if not others and self._joins(region, end):
+                yield end, roadmap.root(end)
+            for way in ways:
+                entered = self._enter(end, way)
+                if entered is not None and entered is not region:
+                    yield end, entered
 
-    def _entered(self, region: Region, z: FloatArray, heading: FloatArray) -> Iterator[Piece]:
-        """Pieces that a ray of a region runs into at an event."""
+    def _headings(self, region: Region) -> Iterator[tuple[FloatArray, tuple[int, ...]]]:
+        """Directions of a region's rays: all around, and those that move fewest joints.
+
+        Each comes with the columns of z, joints, that are held still.
+        """
+        gradients = self._roadmap.tracer.gradients(region.points, region.formation.array)[0]
+        rows = gradients[list(independent_rows(gradients))]
+        basis = tangent_basis(rows)
+        for direction in _directions(len(basis)):
+            yield direction @ basis, ()
+        columns = range(3, self._roadmap.system.dof)
+        for held in islice(combinations(columns, len(basis) - 1), _RAYS):
+            still = np.concatenate([rows, np.eye(self._roadmap.system.dof)[list(held)]])
+            if len(independent_rows(still)) == len(still):
+                (tangent,) = tangent_basis(still)
+                yield tangent, held
+                yield -tangent, held
+
+    def _joins(self, region: Region, z: FloatArray) -> bool:
+        """Tell whether more contacts touch at an event, and hold the object there."""
+        junction = self._roadmap.junction(z)
+        stable = junction.stability is not Stability.UNSTABLE
+        return stable and junction.formation != region.formation
+
+    def _ways(self, region: Region, z: FloatArray, heading: FloatArray) -> list[Departure]:
+        """Formations of fewer than all touching contacts that a ray of a region runs into."""
         roadmap = self._roadmap
-        junction = roadmap.junction(z)
-        if junction.stability is not Stability.UNSTABLE and (
-            junction.formation != region.formation
-        ):
-            yield roadmap.root(z)
-            return
-        if junction.around is None:
-            return
-        for way in crossings(junction.around, roadmap.model, heading, roadmap.failures):
-            entered = self._enter(way.formation, z, way.direction, way.departing)
-            if entered is not None and entered is not region:
-                yield entered
+        around = roadmap.junction(z).around
+        if around is None or self._joins(region, z):
+            return []
+        return crossings(around, roadmap.model, heading, roadmap.failures)
 
 
 def _middles(holds: BoolArray) -> list[int]:

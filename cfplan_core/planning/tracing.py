@@ -27,7 +27,13 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Margins, Stability
 from cfplan_core.planning.bracketing import enclose
 from cfplan_core.planning.events import Candidate, EventKind, sight
-from cfplan_core.planning.manifold import CONVERGED, independent_rows, project, tangent_basis
+from cfplan_core.planning.manifold import (
+    CONVERGED,
+    Projected,
+    independent_rows,
+    project,
+    tangent_basis,
+)
 
 # Margins below this count as lost: nothing is planned that is held by less.
 STABILITY_MARGIN = 1e-6
@@ -107,6 +113,7 @@ class Tracer:
         steer: Steering,
         departing: frozenset[int] = frozenset(),
         longest: float = LONGEST,
+        held: tuple[int, ...] = (),
     ) -> Trace:
         """Follow a formation until an event.
 
@@ -116,8 +123,9 @@ class Tracer:
             steer: Chooses the direction at the beginning of every stretch.
             departing: Other pairs that touch at the start and open.
             longest: Stop with `EventKind.FAR` after this length.
+            held: Columns of z that do not change.
         """
-        return _Pursuit(self, formation, start, steer, departing, longest).run()
+        return _Pursuit(self, formation, start, steer, departing, longest, held).run()
 
 
 class _Pursuit:
@@ -131,6 +139,7 @@ class _Pursuit:
         steer: Steering,
         departing: frozenset[int],
         longest: float,
+        held: tuple[int, ...],
     ) -> None:
         self.system = tracer.system
         self.model = tracer.model
@@ -149,7 +158,8 @@ class _Pursuit:
         chosen = independent_rows(gradients)
         self.rows: IntArray = self.contacts[list(chosen)]
         self.redundant = len(chosen) < len(self.contacts)
-        self.basis = tangent_basis(gradients[list(chosen)])
+        self.held = np.eye(self.system.dof)[list(held)]
+        self.basis = tangent_basis(np.concatenate([gradients[list(chosen)], self.held]))
 
     def run(self) -> Trace:
         z = self.start
@@ -187,7 +197,7 @@ class _Pursuit:
             if self.fresh:
                 # A short first step shows what holds just behind the start.
                 steps = np.concatenate([[0.02 * steps[0]], steps])
-            found = project(self.system, self.rows, z, self.basis, z + steps[:, None] * direction)
+            found = self._project(z, z + steps[:, None] * direction)
             samples = np.concatenate([z[None], found.points])
             change = np.abs(np.diff(samples, axis=0)).max(axis=1)
             smooth = found.converged & (change < 1.5 * self.step)
@@ -262,7 +272,7 @@ class _Pursuit:
 
     def _next_basis(self) -> FloatArray:
         gradients = self._gradients(self.points[-1][-1:], self.rows)[0]
-        return tangent_basis(gradients)
+        return tangent_basis(np.concatenate([gradients, self.held]))
 
     def _penetrates(self, z: FloatArray) -> bool:
         pairs = np.array(sorted(self.departing), dtype=np.intp)
@@ -321,12 +331,8 @@ class _Pursuit:
     ) -> FloatArray | None:
         """Newton's method on the contacts, the event and the coordinates across the motion."""
         system = self.system
-        across = self.basis
-        if len(across) > 1:
-            unit = direction / np.linalg.norm(direction)
-            across = tangent_basis(np.concatenate([tangent_basis(self.basis), unit[None]]))
-        else:
-            across = across[:0]
+        across = tangent_basis((self.basis @ direction)[None]) @ self.basis
+        across = np.concatenate([across, self.held])
         z = guess.copy()
         k = len(self.rows)
         matrix = np.empty((system.dof, system.dof))
@@ -435,7 +441,11 @@ class _Pursuit:
     ) -> FloatArray:
         """Points of the manifold between two of its points, at fractions of shape (s,)."""
         guesses = before + places[:, None] * (after - before)
-        return project(self.system, self.rows, origin, self.basis, guesses).points
+        return self._project(origin, guesses).points
+
+    def _project(self, origin: FloatArray, guesses: FloatArray) -> Projected:
+        complement = np.concatenate([self.basis, self.held])
+        return project(self.system, self.rows, origin, complement, guesses)
 
     def _locate_loss(
         self, origin: FloatArray, before: FloatArray, after: FloatArray

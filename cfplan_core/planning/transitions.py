@@ -144,7 +144,7 @@ def _stable_formations(
         _, singular, right = np.linalg.svd(gradients)
         dimension = dof - (singular > RANK_TOLERANCE).sum(axis=1)
         fits = (dimension >= least) & (dimension <= most)
-        stable = model.margins(gradients).stable > STABILITY_MARGIN
+        stable = np.asarray(model.margins(gradients).stable > STABILITY_MARGIN)
         failures['unstable contact formation'] += int((fits & ~stable).sum())
         for k in np.flatnonzero(fits & stable):
             yield [int(i) for i in subsets[k]], right[k, dof - dimension[k] :]
@@ -155,16 +155,17 @@ def _departure(
 ) -> list[Departure]:
     """Return the departure along a direction of a formation, in a list, if it is possible."""
     inward = around.inward @ direction
-    if (np.abs(inward[kept])[around.at_end[kept]] < _STILL).any():
+    if any(around.at_end[i] and abs(inward[i]) < _STILL for i in kept):
         failures['a vertex would be held on a vertex'] += 1
         return []
-    if (inward[kept] < 0.0).any():
+    if any(inward[i] < 0.0 for i in kept):
         failures['a contact would leave its edge'] += 1
         return []
-    beside = around.together[:, kept].any(axis=1)
-    opening = [i for i in range(len(around.pairs)) if i not in kept and not beside[i]]
+    opening = [
+        i for i in range(len(around.pairs)) if i not in kept and not around.together[i, kept].any()
+    ]
     rates = around.gradients[opening] @ direction
-    if (rates < -_STILL).any():
+    if any(rate < -_STILL for rate in rates):
         failures['a contact would penetrate'] += 1
         return []
     # A gap that stays as it is closes nothing where the vertex slides off the end of the edge.
