@@ -8,6 +8,7 @@ suffices to look at the planes through all pairs: on either side of each must li
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,14 +19,32 @@ _PARALLEL = 1e-9
 _COPLANAR = 1e-9
 
 
+class _Planes(NamedTuple):
+    """Index tables for k vectors.
+
+    Attributes:
+        first: Shape (p,): with `second` all pairs of vectors, each spanning a plane.
+        second: Shape (p,).
+        pair: Shape (p, 1): 0 to p - 1.
+        others: Shape (p, k - 2): the vectors that are not in the pair.
+        rest: Shape (p,), true for pairs without the last vector.
+    """
+
+    first: IntArray
+    second: IntArray
+    pair: IntArray
+    others: IntArray
+    rest: BoolArray
+
+
 @lru_cache(maxsize=64)
-def _planes(count: int) -> tuple[IntArray, IntArray, FloatArray]:
-    """Pairs of vectors, and for each pair a huge value at its own two vectors, else zero."""
+def _planes(count: int) -> _Planes:
     first, second = np.triu_indices(count, 1)
-    own = np.zeros((len(first), count))
-    rows = np.arange(len(first))
-    own[rows, first] = own[rows, second] = 1e9
-    return first, second, own
+    others = [
+        [k for k in range(count) if k not in pair] for pair in zip(first, second, strict=True)
+    ]
+    table = np.array(others, dtype=np.intp).reshape(len(first), -1)
+    return _Planes(first, second, np.arange(len(first))[:, None], table, second < count - 1)
 
 
 def span_margin(vectors: FloatArray) -> FloatArray:
@@ -57,7 +76,7 @@ def span_margins(vectors: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray
     """
     height, length = _heights(vectors)
     count = vectors.shape[1]
-    rest = _planes(count)[1] < count - 1
+    rest = _planes(count).rest
     signs = np.concatenate([height > _COPLANAR, height < -_COPLANAR], axis=1)
     return (
         _margin(height, length),
@@ -75,7 +94,7 @@ def _heights(vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
     Returns:
         Shapes (s, p, k) and (s, p) for the p pairs of vectors.
     """
-    first, second, _ = _planes(vectors.shape[1])
+    first, second = _planes(vectors.shape[1])[:2]
     a, b = vectors[:, first], vectors[:, second]
     normal = np.empty_like(a)
     normal[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
@@ -89,8 +108,10 @@ def _margin(height: FloatArray, length: FloatArray) -> FloatArray:
     count = height.shape[-1]
     if count < 4:
         return np.full(len(height), -1.0)
-    own = _planes(count)[2]
-    emptier = np.minimum((height - own).max(axis=-1), -(height + own).min(axis=-1))
-    margin = np.where(length > _PARALLEL, emptier / np.maximum(length, _PARALLEL), np.inf)
-    smallest = margin.min(axis=-1)
-    return np.where(np.isfinite(smallest), smallest, -1.0)
+    planes = _planes(count)
+    others = height[:, planes.pair, planes.others]
+    emptier = np.minimum(others.max(axis=-1), -others.min(axis=-1))
+    emptier[length <= _PARALLEL] = np.inf
+    smallest = (emptier / np.maximum(length, _PARALLEL)).min(axis=-1)
+    smallest[np.isinf(smallest)] = -1.0
+    return np.asarray(smallest)

@@ -20,6 +20,8 @@ RANK_TOLERANCE = 1e-7
 # Newton's method squares the error: after a step this small it is below rounding.
 CONVERGED = 1e-7
 _ITERATIONS = 8
+# A step this long has lost the manifold.
+_ASTRAY = 10.0
 
 
 class Projected(NamedTuple):
@@ -114,10 +116,11 @@ def project(
                 break
             change = np.abs(step).max(axis=1)
             points -= step
-            if not (change > CONVERGED).any():
+            largest = float(change.max())
+            if largest <= CONVERGED:
                 break
-            if (change > 10.0).any():
-                points[~(change <= 10.0)] = origin
+            if not largest <= _ASTRAY:
+                points[~(change <= _ASTRAY)] = origin
     return Projected(points, gradients, change <= CONVERGED)
 
 
