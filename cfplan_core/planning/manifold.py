@@ -89,15 +89,16 @@ def project(
     Args:
         system: Compiled problem.
         rows: Pairs whose gaps vanish, independent, shape (k,).
-        origin: Shape (3 + n,).
-        basis: Shape (3 + n - k, 3 + n), completes the gradients to full rank.
+        origin: Shape (3 + n,), or (s, 3 + n) for an origin of each guess's own.
+        basis: Shape (3 + n - k, 3 + n), completes the gradients to full rank; or one of each
+            guess's own, shape (s, 3 + n - k, 3 + n).
         guesses: Shape (s, 3 + n).
 
     Returns:
         The points; those that did not converge are where the iteration stopped.
     """
     points = guesses.copy()
-    wanted = (guesses - origin) @ basis.T
+    wanted = (basis @ (guesses - origin)[..., None])[..., 0]
     count, k = len(points), len(rows)
     matrix = np.empty((count, system.dof, system.dof))
     matrix[:, k:] = basis
@@ -109,7 +110,7 @@ def project(
             gradients = gap_gradients(system, placed, rows)
             matrix[:, :k] = gradients
             residual[:, :k, 0] = gaps(system, placed, rows).gap
-            residual[:, k:, 0] = (points - origin) @ basis.T - wanted
+            residual[:, k:, 0] = (basis @ (points - origin)[..., None])[..., 0] - wanted
             try:
                 step = np.linalg.solve(matrix, residual)[..., 0]
             except np.linalg.LinAlgError:
@@ -120,7 +121,8 @@ def project(
             if largest <= CONVERGED:
                 break
             if not largest <= _ASTRAY:
-                points[~(change <= _ASTRAY)] = origin
+                astray = ~(change <= _ASTRAY)
+                points[astray] = np.broadcast_to(origin, points.shape)[astray]
     return Projected(points, gradients, change <= CONVERGED)
 
 

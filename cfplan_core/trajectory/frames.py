@@ -11,13 +11,15 @@ from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel
-from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
+from cfplan_core.planning.manifold import independent_rows, project
 from cfplan_core.planning.search import Leg
 from cfplan_core.trajectory.plan_result import Segment
 
-# Largest change between frames: of a joint, of the object's angle, both in rad, and of its
-# position, in object sizes (the format cfplan/plan/1 allows 0.05 of each).
-_LARGEST = 0.048
+# Largest change between frames of a joint or of the object's angle, in rad, and of its position,
+# in object sizes. The format cfplan/plan/1 allows 0.05 of each; half of that for the position
+# holds also where a reader takes the object's radius for its size.
+_LARGEST_TURN = 0.048
+_LARGEST_SHIFT = 0.024
 # Frames inside a segment nearer than this are left out.
 _SMALLEST = 0.01
 
@@ -90,14 +92,16 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
     )
 
 
-def _change(system: ContactSystem, z: FloatArray) -> FloatArray:
-    """Largest change from each point to the next, shape (s - 1,): rad and object sizes."""
-    step = np.abs(np.diff(z[:, 2:], axis=0)).max(axis=1)
-    frame = system.object_poses(z)[:, :2] / system.size
+def _steps(system: ContactSystem, z: FloatArray) -> FloatArray:
+    """Size of the step from each point to the next, shape (s - 1,), by the largest allowed."""
+    turn = np.abs(np.diff(z[:, 2:], axis=0)).max(axis=1) / _LARGEST_TURN
     # The plan gives the object's frame, its mechanics the centre of mass: both move slowly.
-    for place in (frame, z[:, :2]):
-        step = np.maximum(step, np.linalg.norm(np.diff(place, axis=0), axis=1))
-    return np.asarray(step)
+    frame = system.object_poses(z)[:, :2] / system.size
+    shift = np.maximum(
+        np.linalg.norm(np.diff(frame, axis=0), axis=1),
+        np.linalg.norm(np.diff(z[:, :2], axis=0), axis=1),
+    )
+    return np.asarray(np.maximum(turn, shift / _LARGEST_SHIFT))
 
 
 def _evenly(system: ContactSystem, leg: Leg) -> FloatArray:
@@ -111,21 +115,20 @@ def _evenly(system: ContactSystem, leg: Leg) -> FloatArray:
         kept.append(leg.points[-1])
     points = np.array(kept)
     while True:
-        large = np.flatnonzero(_change(system, points) > _LARGEST)
+        large = np.flatnonzero(_steps(system, points) > 1.0)
         if not len(large):
             return points
-        middles = [_between(system, leg, points[i], points[i + 1]) for i in large]
+        middles = _middles(system, leg, points[large], points[large + 1])
         points = np.insert(points, large + 1, middles, axis=0)
 
 
-def _between(system: ContactSystem, leg: Leg, before: FloatArray, after: FloatArray) -> FloatArray:
-    """The point of a formation's manifold half way between two neighbours."""
+def _middles(system: ContactSystem, leg: Leg, before: FloatArray, after: FloatArray) -> FloatArray:
+    """Points of a formation's manifold half way between neighbours, each of shape (s, 3 + n)."""
     pairs = leg.formation.array
-    gradients = gap_gradients(system, system.place(before[None]), pairs)[0]
-    rows = list(independent_rows(gradients))
-    basis = tangent_basis(gradients[rows])
-    middle = 0.5 * (before + after)
-    return np.asarray(project(system, pairs[rows], before, basis, middle[None]).points[0])
+    gradients = gap_gradients(system, system.place(before), pairs)
+    rows = list(independent_rows(gradients[0]))
+    basis = np.linalg.svd(gradients[:, rows])[2][:, len(rows) :]
+    return project(system, pairs[rows], before, basis, 0.5 * (before + after)).points
 
 
 def _torque_limits(

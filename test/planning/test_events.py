@@ -83,17 +83,14 @@ def test_gap_that_is_closed_to_begin_with_does_not_close() -> None:
 
 
 def test_fingertip_that_leaves_the_top_of_its_side_is_seen() -> None:
-    """The tip rises to the block's height of 0.035 m at x = 0.02 + 0.05 cos θ - 0.06."""
+    """The left tip rises above the block's height of 0.035 m at x = -0.0043."""
     problem = pushed_block(height=0.035)
     system = ContactSystem(problem)
     samples = slide(problem, np.array([0.0, -0.002, -0.004, -0.0045]))
     sighting = look(problem, samples)
-    (candidate,) = sighting.candidates
+    (candidate,) = (c for c in sighting.candidates if c.kind is EventKind.EDGE_END)
     assert sighting.interval == 2
-    assert (candidate.kind, candidate.index) == (
-        EventKind.EDGE_END,
-        system.pair(parse_contact(TIPS[0])),
-    )
+    assert candidate.index == system.pair(parse_contact(TIPS[0]))
     # Edge 3 runs down: its beginning is at the top.
     assert candidate.target == 0.0
     assert 0.0 < candidate.fraction < 1.0
