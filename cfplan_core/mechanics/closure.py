@@ -43,7 +43,7 @@ def _planes(count: int) -> _Planes:
     others = [
         [k for k in range(count) if k not in pair] for pair in zip(first, second, strict=True)
     ]
-    table = np.array(others, dtype=np.intp).reshape(len(first), -1)
+    table = np.array(others, dtype=np.intp).reshape(len(first), max(count - 2, 0))
     return _Planes(first, second, np.arange(len(first))[:, None], table, second < count - 1)
 
 

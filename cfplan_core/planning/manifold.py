@@ -7,6 +7,7 @@ coordinates at once: the steps along a whole stretch of a curve are solved for i
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -124,6 +125,34 @@ def project(
                 astray = ~(change <= _ASTRAY)
                 points[astray] = np.broadcast_to(origin, points.shape)[astray]
     return Projected(points, gradients, change <= CONVERGED)
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Coordinates on a formation's manifold around one of its points.
+
+    Attributes:
+        system: Compiled problem.
+        rows: Independent pairs whose gaps vanish, shape (k,).
+        origin: Shape (3 + n,).
+        basis: Orthonormal tangents, shape (d, 3 + n).
+        held: Rows of the coordinates that do not change, shape (3 + n - k - d, 3 + n).
+    """
+
+    system: ContactSystem
+    rows: IntArray
+    origin: FloatArray
+    basis: FloatArray
+    held: FloatArray
+
+    def project(self, guesses: FloatArray) -> Projected:
+        """Move guesses of shape (s, 3 + n) onto the manifold, keeping their coordinates."""
+        complement = np.concatenate([self.basis, self.held])
+        return project(self.system, self.rows, self.origin, complement, guesses)
+
+    def between(self, before: FloatArray, after: FloatArray, places: FloatArray) -> FloatArray:
+        """Points between two points of the manifold, at fractions of shape (s,)."""
+        return self.project(before + places[:, None] * (after - before)).points
 
 
 def settle(system: ContactSystem, z: FloatArray, pairs: IntArray) -> FloatArray:

@@ -235,7 +235,10 @@ class Regions:
         around = roadmap.junction(z).around
         if around is None or self._joins(region, z):
             return []
-        return crossings(around, roadmap.model, heading, roadmap.failures)
+        refused = roadmap.failures.total()
+        ways = crossings(around, roadmap.model, heading, roadmap.failures)
+        roadmap.attempts += roadmap.failures.total() - refused
+        return ways
 
 
 def _middles(holds: BoolArray) -> list[int]:

@@ -151,7 +151,9 @@ class Roadmap:
     def _ways(self, junction: Junction) -> list[Departure]:
         if junction.ways is None:
             assert junction.around is not None
+            refused = self.failures.total()
             junction.ways = departures(junction.around, self.model, self.failures)
+            self.attempts += self.failures.total() - refused
         return junction.ways
 
     def _behind(self, junction: Junction) -> Iterator[Piece | None]:

@@ -8,7 +8,7 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.bracketing import enclose
-from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
+from cfplan_core.planning.manifold import Chart, independent_rows, tangent_basis
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
 
 _INNER = np.arange(1, 8) / 8.0
@@ -52,8 +52,8 @@ def _refined(tracer: Tracer, formation: Formation, points: FloatArray) -> FloatA
     closed = margins.form_closure > STABILITY_MARGIN
     turns = (margins.signs[1:] != margins.signs[:-1]).any(axis=1)
     for interval in np.flatnonzero(turns & (closed[1:] == closed[:-1]))[::-1]:
-        ends = points[interval], points[interval + 1]
-        between = _between(tracer, formation, *ends, _INNER)
+        before, after = points[interval], points[interval + 1]
+        between = _chart(tracer, formation, before).between(before, after, _INNER)
         inner = tracer.margins(formation, between).form_closure > STABILITY_MARGIN
         if (inner != closed[interval]).any():
             points = np.insert(points, interval + 1, between, axis=0)
@@ -64,27 +64,19 @@ def _boundary(
     tracer: Tracer, formation: Formation, before: FloatArray, after: FloatArray, closed: bool
 ) -> FloatArray:
     """Locate the change between two points; the result has form closure."""
+    chart = _chart(tracer, formation, before)
 
     def margin(fractions: FloatArray) -> FloatArray:
-        points = _between(tracer, formation, before, after, fractions)
+        points = chart.between(before, after, fractions)
         return tracer.margins(formation, points).form_closure - STABILITY_MARGIN
 
     low, high = enclose(margin, _WIDTH)
     place = np.array([low if closed else high])
-    return np.asarray(_between(tracer, formation, before, after, place)[0])
+    return np.asarray(chart.between(before, after, place)[0])
 
 
-def _between(
-    tracer: Tracer,
-    formation: Formation,
-    before: FloatArray,
-    after: FloatArray,
-    fractions: FloatArray,
-) -> FloatArray:
-    """Points of the manifold between two of its points."""
-    pairs = formation.array
-    gradients = tracer.gradients(before[None], pairs)[0]
+def _chart(tracer: Tracer, formation: Formation, z: FloatArray) -> Chart:
+    gradients = tracer.gradients(z[None], formation.array)[0]
     rows = list(independent_rows(gradients))
     basis = tangent_basis(gradients[rows])
-    guesses = before + fractions[:, None] * (after - before)
-    return project(tracer.system, pairs[rows], before, basis, guesses).points
+    return Chart(tracer.system, formation.array[rows], z, basis, np.empty((0, len(z))))

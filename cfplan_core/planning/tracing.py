@@ -3,8 +3,7 @@
 The curve is the formation's manifold itself where that has dimension one, and a path steered in
 the manifold where it has more. It is followed in stretches: a whole stretch of steps along the
 tangent is projected onto the manifold by one batched Newton iteration, searched for events, and
-cut at the first. Events are located by Newton's method where their gradient is known (gaps, edge
-ends, joint limits) and inside a bracket otherwise (stability).
+cut at the first.
 """
 
 from __future__ import annotations
@@ -15,25 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.gaps import (
-    gap_gradients,
-    gaps,
-    offset_gradients,
-    wedge_lift_gradients,
-    wedge_lifts,
-)
-from cfplan_core.contact.system import ContactSystem, IntArray, Placement
+from cfplan_core.contact.gaps import gap_gradients, gaps
+from cfplan_core.contact.system import ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Margins, Stability
 from cfplan_core.planning.bracketing import enclose
 from cfplan_core.planning.events import Candidate, EventKind, sight
-from cfplan_core.planning.manifold import (
-    CONVERGED,
-    Projected,
-    independent_rows,
-    project,
-    tangent_basis,
-)
+from cfplan_core.planning.locating import locate
+from cfplan_core.planning.manifold import Chart, independent_rows, tangent_basis
 
 # Margins below this count as lost: nothing is planned that is held by less.
 STABILITY_MARGIN = 1e-6
@@ -159,14 +147,14 @@ class _Pursuit:
         self.rows: IntArray = self.contacts[list(chosen)]
         self.redundant = len(chosen) < len(self.contacts)
         self.held = np.eye(self.system.dof)[list(held)]
-        self.basis = tangent_basis(np.concatenate([gradients[list(chosen)], self.held]))
+        self.chart = self._chart(start)
 
     def run(self) -> Trace:
         z = self.start
         length = 0.0
         while length < self.longest:
             self.checkpoint()
-            direction = self.steer(z, self.basis)
+            direction = self.steer(z, self.chart.basis)
             if direction is None:
                 return self._finish(EventKind.TARGET)
             samples = self._stretch(z, direction)
@@ -197,7 +185,7 @@ class _Pursuit:
             if self.fresh:
                 # A short first step shows what holds just behind the start.
                 steps = np.concatenate([[0.02 * steps[0]], steps])
-            found = self._project(z, z + steps[:, None] * direction)
+            found = self.chart.project(z + steps[:, None] * direction)
             samples = np.concatenate([z[None], found.points])
             change = np.abs(np.diff(samples, axis=0)).max(axis=1)
             smooth = found.converged & (change < 1.5 * self.step)
@@ -240,7 +228,7 @@ class _Pursuit:
         else:
             self._take(samples[1:])
             self.step = min(2.0 * self.step, STEP)
-        self.basis = self._next_basis()
+        self.chart = self._chart(self.points[-1][-1])
         return None
 
     def _watch(
@@ -258,7 +246,7 @@ class _Pursuit:
         suspects[last + 1 :] = False
         for interval in np.flatnonzero(suspects):
             ends = samples[interval], samples[interval + 1]
-            between = self._between(samples[0], *ends, _INNER)
+            between = self.chart.between(*ends, _INNER)
             inner = self.model.margins(self._gradients(between, self.contacts)).stable
             if (inner <= STABILITY_MARGIN).any():
                 first = int(np.argmax(inner <= STABILITY_MARGIN))
@@ -270,9 +258,10 @@ class _Pursuit:
         self.points.append(samples)
         self.fresh = False
 
-    def _next_basis(self) -> FloatArray:
-        gradients = self._gradients(self.points[-1][-1:], self.rows)[0]
-        return tangent_basis(np.concatenate([gradients, self.held]))
+    def _chart(self, z: FloatArray) -> Chart:
+        gradients = self._gradients(z[None], self.rows)[0]
+        basis = tangent_basis(np.concatenate([gradients, self.held]))
+        return Chart(self.system, self.rows, z, basis, self.held)
 
     def _penetrates(self, z: FloatArray) -> bool:
         pairs = np.array(sorted(self.departing), dtype=np.intp)
@@ -297,14 +286,14 @@ class _Pursuit:
 
         located: list[tuple[float, FloatArray, EventKind, int]] = []
         if unstable:
-            edge = self._locate_loss(samples[0], before, after)
+            edge = self._locate_loss(self.chart, before, after)
             located.append((along(edge), edge, EventKind.UNSTABLE, -1))
         tried: set[tuple[EventKind, int]] = set()
         while candidates:
             for candidate in candidates:
                 tried.add((candidate.kind, candidate.index))
-                z = self._find(candidate, samples[0], before, after, direction)
-                if z is not None and self._happens(candidate, z):
+                z = locate(self.chart, candidate, before, after, direction)
+                if z is not None:
                     located.append((along(z), z, candidate.kind, candidate.index))
             if not located:
                 break
@@ -322,140 +311,12 @@ class _Pursuit:
         self._take(z[None])
         return self._finish(kind, together)
 
-    def _newton(
-        self,
-        candidate: Candidate,
-        guess: FloatArray,
-        origin: FloatArray,
-        direction: FloatArray,
-    ) -> FloatArray | None:
-        """Newton's method on the contacts, the event and the coordinates across the motion."""
-        system = self.system
-        across = tangent_basis((self.basis @ direction)[None]) @ self.basis
-        across = np.concatenate([across, self.held])
-        z = guess.copy()
-        k = len(self.rows)
-        matrix = np.empty((system.dof, system.dof))
-        residual = np.empty(system.dof)
-        for _ in range(20):
-            placed = system.place(z[None])
-            matrix[:k] = gap_gradients(system, placed, self.rows)[0]
-            residual[:k] = gaps(system, placed, self.rows).gap[0]
-            (residual[k],), (matrix[k],) = self._event(candidate, z[None], placed)
-            matrix[k + 1 :] = across
-            residual[k + 1 :] = across @ (z - origin)
-            try:
-                step = np.linalg.solve(matrix, residual)
-            except np.linalg.LinAlgError:
-                return None
-            z = z - step
-            change = float(np.abs(step).max())
-            if change > 1.0:
-                return None
-            if change < CONVERGED:
-                break
-        else:
-            return None
-        return z
-
-    def _happens(self, candidate: Candidate, z: FloatArray) -> bool:
-        """Tell whether a located gap is zero on its edge, and not beyond its ends."""
-        if candidate.kind not in (EventKind.CONTACT, EventKind.LINKS_MEET):
-            return True
-        pair = np.array([candidate.index], dtype=np.intp)
-        offset = float(gaps(self.system, self.system.place(z[None]), pair).offset[0, 0])
-        return -1e-9 <= offset <= float(self.system.pair_length[candidate.index]) + 1e-9
-
-    def _event(
-        self, candidate: Candidate, z: FloatArray, placed: Placement
-    ) -> tuple[FloatArray, FloatArray]:
-        """Function whose root the event is, and its gradient.
-
-        Args:
-            candidate: The event.
-            z: Shape (s, 3 + n).
-            placed: The features at z.
-
-        Returns:
-            Values, shape (s,), and gradients, shape (s, 3 + n).
-        """
-        system = self.system
-        if candidate.kind is EventKind.JOINT_LIMIT:
-            column = 3 + candidate.index
-            unit = np.eye(system.dof)[column]
-            return z[:, column] - candidate.target, np.tile(unit, (len(z), 1))
-        pair = np.array([candidate.index], dtype=np.intp)
-        if candidate.kind in (EventKind.FLUSH_AFTER, EventKind.FLUSH_BEFORE):
-            side = 0 if candidate.kind is EventKind.FLUSH_AFTER else 1
-            value = wedge_lifts(system, placed, pair)[side]
-            gradient = wedge_lift_gradients(system, placed, pair)[side]
-        elif candidate.kind is EventKind.EDGE_END:
-            value = gaps(system, placed, pair).offset - candidate.target
-            gradient = offset_gradients(system, placed, pair)
-        else:
-            value = gaps(system, placed, pair).gap
-            gradient = gap_gradients(system, placed, pair)
-        return value[:, 0], gradient[:, 0]
-
-    def _find(
-        self,
-        candidate: Candidate,
-        origin: FloatArray,
-        before: FloatArray,
-        after: FloatArray,
-        direction: FloatArray,
-    ) -> FloatArray | None:
-        """Locate an event between two points, or return None if it is not between them."""
-
-        def between(z: FloatArray | None) -> bool:
-            if z is None:
-                return False
-            low, at, high = (float(v @ direction) for v in (before, z, after))
-            slack = 1e-6 + 0.01 * (high - low)
-            return low - slack <= at <= high + slack
-
-        guess = before + candidate.fraction * (after - before)
-        z = self._newton(candidate, guess, origin, direction)
-        if between(z):
-            return z
-        # Another root, or contacts that become dependent just there: enclose it.
-        if not self._changes_sign(candidate, before, after):
-            return None
-
-        def values(places: FloatArray) -> FloatArray:
-            points = self._between(origin, before, after, places)
-            return self._event(candidate, points, self.system.place(points))[0]
-
-        _, place = enclose(values)
-        enclosed = self._between(origin, before, after, np.array([place]))[0]
-        z = self._newton(candidate, enclosed, origin, direction)
-        return z if between(z) else enclosed
-
-    def _changes_sign(self, candidate: Candidate, before: FloatArray, after: FloatArray) -> bool:
-        points = np.stack([before, after])
-        first, last = self._event(candidate, points, self.system.place(points))[0]
-        return bool(first * last < 0.0)
-
-    def _between(
-        self, origin: FloatArray, before: FloatArray, after: FloatArray, places: FloatArray
-    ) -> FloatArray:
-        """Points of the manifold between two of its points, at fractions of shape (s,)."""
-        guesses = before + places[:, None] * (after - before)
-        return self._project(origin, guesses).points
-
-    def _project(self, origin: FloatArray, guesses: FloatArray) -> Projected:
-        complement = np.concatenate([self.basis, self.held])
-        return project(self.system, self.rows, origin, complement, guesses)
-
-    def _locate_loss(
-        self, origin: FloatArray, before: FloatArray, after: FloatArray
-    ) -> FloatArray:
+    def _locate_loss(self, chart: Chart, before: FloatArray, after: FloatArray) -> FloatArray:
         """Find the last stable configuration between two points of which the first is stable."""
 
         def margin(places: FloatArray) -> FloatArray:
-            points = self._between(origin, before, after, places)
-            gradients = self._gradients(points, self.contacts)
+            gradients = self._gradients(chart.between(before, after, places), self.contacts)
             return self.model.margins(gradients).stable - STABILITY_MARGIN
 
         place = np.array([enclose(margin)[0]])
-        return np.asarray(self._between(origin, before, after, place)[0])
+        return np.asarray(chart.between(before, after, place)[0])

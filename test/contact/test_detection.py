@@ -263,7 +263,7 @@ def test_edge_tilted_within_the_tolerance_is_flush(palm: Polygon, tilt: float) -
 @pytest.mark.parametrize('tilt', [-5e-4, 5e-4])
 @pytest.mark.parametrize('side', [-1.0, 1.0])
 def test_short_overlap_tilted_within_the_tolerance_is_flush(side: float, tilt: float) -> None:
-    """The block's outer 2 mm on the plate, turned about their middle: 1 mm times 5e-4 is 0.5 µm."""
+    """The box's outer 2 mm on the plate, turned about their middle: 1 mm times 5e-4 is 0.5 µm."""
     ends = sorted((0.018 * side, 0.1 * side))
     pivot = 0.019 * side
     pose = (pivot - pivot * math.cos(tilt), -pivot * math.sin(tilt), tilt)

@@ -195,3 +195,10 @@ def test_edge_along_the_rim_of_a_notch_and_into_the_wall_overlaps() -> None:
 @pytest.mark.parametrize('turn', [1e-310, 1e-200, 1e-17])
 def test_edges_that_are_all_but_parallel_overlap_without_a_warning(turn: float) -> None:
     assert penetration_depth(SQUARE, turned(shifted(SQUARE, 0.5, 0.0), turn)) == pytest.approx(0.5)
+
+
+def test_edge_that_enters_and_leaves_through_vertices_counts_by_its_piece_inside() -> None:
+    """A bar's upper edge along a diamond's diagonal: deepest in the diamond's middle."""
+    diamond = np.array([(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)])
+    bar = np.array([(-3.0, -0.1), (2.0, -0.1), (2.0, 0.0), (-3.0, 0.0)])
+    assert penetration_depth(diamond, bar) == pytest.approx(math.sqrt(0.5))

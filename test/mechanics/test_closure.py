@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from cfplan_core.mechanics.closure import span_margin
+from cfplan_core.mechanics.closure import span_margin, span_margins
 
 FloatArray = NDArray[np.float64]
 
@@ -140,6 +142,48 @@ def test_order_does_not_matter(rows: FloatArray) -> None:
 def test_batch_is_judged_one_by_one() -> None:
     batch = np.random.default_rng(5).normal(size=(30, 5, 3))
     assert span_margin(batch).tolist() == [margin(rows) for rows in batch]
+
+
+@given(rows=vectors())
+def test_margins_are_those_of_all_vectors_and_of_all_but_the_last(rows: FloatArray) -> None:
+    margins, rest, _ = span_margins(rows[None])
+    assert margins.tolist() == [margin(rows)]
+    assert rest.tolist() == [margin(rows[:-1])]
+
+
+@pytest.mark.parametrize('count', [1, 2, 3])
+def test_margins_of_few_vectors_say_that_they_do_not_span(count: int) -> None:
+    margins, rest, _ = span_margins(np.eye(3)[None, :count])
+    assert margins[0] < 0.0
+    assert rest[0] < 0.0
+
+
+def determinants(rows: FloatArray) -> list[float]:
+    return [float(np.linalg.det(np.array(triple))) for triple in combinations(rows, 3)]
+
+
+@given(rows=vectors(), index=st.integers(0, 2), share=st.floats(0.0, 2.0))
+def test_signs_tell_where_a_determinant_changes_its_sign(
+    rows: FloatArray, index: int, share: float
+) -> None:
+    """One vector moves towards the mirror image of its successor, through zero determinants."""
+    moved = rows.copy()
+    moved[index] -= share * rows[index + 1 if index + 1 < len(rows) else 0]
+    before, after = determinants(rows), determinants(moved)
+    assume(all(d == 0.0 or abs(d) > 1e-7 for d in np.abs([*before, *after])))
+    signs = span_margins(np.array([rows, moved]))[2]
+    changed = bool((np.sign(before) != np.sign(after)).any())
+    assert bool((signs[0] != signs[1]).any()) == changed
+
+
+@given(rows=vectors(), seed=st.integers(0, 1000), size=st.sampled_from([1e-4, 1e-2, 0.1]))
+def test_verdict_is_the_same_where_all_signs_are(rows: FloatArray, seed: int, size: float) -> None:
+    noise = size * np.random.default_rng(seed).normal(size=rows.shape)
+    margins, rest, signs = span_margins(np.array([rows, rows + noise]))
+    assume((signs[0] == signs[1]).all())
+    for found in (margins, rest):
+        if (np.abs(found) > UNDECIDABLE).all():
+            assert (found[0] > 0.0) == (found[1] > 0.0)
 
 
 def test_margin_is_continuous_across_zero() -> None:

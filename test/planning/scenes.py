@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -60,10 +61,7 @@ def pushed_block(
     limits: tuple[float, float] = (0.01, 3.13),
     palms: Sequence[Polygon] = (),
 ) -> Problem:
-    """A block between two fingertips at different heights: force closure, to start with at x = 0.
-
-    With equal heights, at `EQUAL_HEIGHTS`, the tips press along one line and hold nothing.
-    """
+    """A block between two fingertips, to start with at x = 0: force closure everywhere."""
     return _problem(
         'pushed',
         [(-HALF, 0.0), (HALF, 0.0), (HALF, height), (-HALF, height)],
@@ -76,7 +74,17 @@ def pushed_block(
     )
 
 
-# (x + 0.04)² + height² = LEFT² and (0.04 - x)² + height² = RIGHT².
+def leaning_tower() -> Problem:
+    """A high block between two fingertips, gravity pulling it over to the left.
+
+    The couple of the tips, the left one above the right one, keeps it on both feet; the pull is
+    twice as strong to the left as down. Where the right tip is higher nothing does: it is held up
+    to x = `EQUAL_HEIGHTS`.
+    """
+    return replace(pushed_block(height=0.08), gravity=(-8.0, -4.0))
+
+
+# There (x + 0.04)² + height² = LEFT² and (0.04 - x)² + height² = RIGHT².
 EQUAL_HEIGHTS = (LEFT**2 - RIGHT**2) / (4.0 * (BASE - HALF))
 
 

@@ -195,6 +195,16 @@ def test_unstable_grasp_is_told_what_it_nearly_touches() -> None:
     assert '; object.e1|right.link.v2 is 0.0001' in value
 
 
+@pytest.mark.parametrize('tilt', np.linspace(0.1, 6.1, 13))
+def test_contacts_that_touch_are_not_near_misses(tilt: float) -> None:
+    """Block and table turned together, so that gaps are zero but for rounding."""
+    c, s = math.cos(tilt), math.sin(tilt)
+    table = np.array(TABLE) @ [[c, s], [-s, c]]
+    _, value, _ = only_finding(block((0.0, 0.0, tilt), fingers=[], palms=[table]))
+    assert all(foot in value for foot in FEET)
+    assert ' apart' not in value
+
+
 def test_tip_held_from_one_side_is_unstable() -> None:
     assert 'an unstable grasp' in only_finding(block(fingers=[LEFT]))[1]
 
