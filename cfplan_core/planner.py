@@ -108,10 +108,13 @@ class _Planning:
             message = '\n'.join(str(finding) for finding in examined.findings)
             return self._answer(Status.INVALID, message)
         goal: FloatArray | GoalTest
-        if examined.goal is not None:
-            goal = examined.goal.z
-        else:
-            goal = GoalTest(self.system, self.problem.goal)
+        try:
+            if examined.goal is not None:
+                goal = examined.goal.z
+            else:
+                goal = GoalTest(self.system, self.problem.goal)
+        except CfplanError as error:
+            return self._answer(Status.INVALID, f'goal: {error}')
         try:
             frames = self._search(examined.start.z, goal)
         except _BudgetExhaustedError as stop:
@@ -174,9 +177,13 @@ class _Planning:
     def _doubt(self) -> str:
         """How far an answer of no path is short of a proof."""
         regions = sum(piece.dimension > 1 for piece in self.roadmap.pieces)
+        blocked = self.roadmap.failures['a joint would exceed its effort limit']
+        doubt = ''
+        if blocked:
+            doubt += f'. Left out, as a joint would exceed its effort limit: {blocked} pieces'
         if not regions:
-            return ''
-        return (
+            return doubt
+        return doubt + (
             '. Contact formations of dimension 0 and 1 were searched completely, '
             f'{regions} regions of dimension 2 and more only along rays'
         )

@@ -77,7 +77,8 @@ def span_margins(vectors: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray
     height, length = _heights(vectors)
     count = vectors.shape[1]
     rest = _planes(count).rest
-    signs = np.concatenate([height > _COPLANAR, height < -_COPLANAR], axis=1)
+    # Every triple is there in both orientations: one comparison shows both signs.
+    signs = height > _COPLANAR
     return (
         _margin(height, length),
         _margin(height[:, rest, :-1], length[:, rest]),

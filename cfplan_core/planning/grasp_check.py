@@ -21,6 +21,7 @@ from cfplan_core.planning.tracing import classify
 
 # Numbers in files are rounded: nearer than this, in m, is touching (cfplan/problem/1).
 TOUCHING = 1e-6
+_ROUNDING = 1e-9
 # Gaps up to this part of the object's size are named when a grasp is not stable.
 _NEAR = 0.05
 
@@ -135,7 +136,8 @@ def examine_grasp(
         field: Name of the grasp in findings, ``start`` or ``goal``.
         file: Named in findings.
     """
-    findings = _overlaps(system.problem, grasp, field, file)
+    findings = _joint_limits(system.problem, grasp, field, file)
+    findings += _overlaps(system.problem, grasp, field, file)
     z = system.configuration(grasp)
     pairs = touching(system, z, TOUCHING / system.size)
     dimension, stability = system.dof, Stability.UNSTABLE
@@ -176,7 +178,38 @@ def examine_grasp(
                 'contacts whose forces, all positive, balance the weight (margin above zero)',
             )
         )
+    elif stability is not Stability.UNSTABLE:
+        findings += _efforts(system, model, z, gradients, field, file)
     return ExaminedGrasp(z, pairs, stability, dimension, tuple(findings))
+
+
+def _efforts(
+    system: ContactSystem,
+    model: ContactModel,
+    z: FloatArray,
+    gradients: FloatArray,
+    field: str,
+    file: str,
+) -> list[Finding]:
+    """Find out whether the joints are too weak for a stable grasp."""
+    unit = system.force_unit * system.size
+    effort = np.array([joint.effort_limit for joint in system.problem.hand.joints])
+    weight = system.link_weight_torques(z[None])
+    if model.holds_within(gradients, -effort / unit - weight, effort / unit - weight).all():
+        return []
+    lower, upper = ((limit + weight)[0] * unit for limit in model.torque_limits(gradients))
+    needed = ', '.join(
+        f'{joint.name} from {low:.3g} to {high:.3g} N m'
+        for joint, low, high in zip(system.problem.hand.joints, lower, upper, strict=True)
+    )
+    return [
+        Finding(
+            file,
+            field,
+            f'a grasp that takes torques of {needed}',
+            f'torques within the effort limits {", ".join(f"{e:g}" for e in effort)} N m',
+        )
+    ]
 
 
 def _near_misses(system: ContactSystem, z: FloatArray, pairs: IntArray) -> str:
@@ -192,6 +225,20 @@ def _near_misses(system: ContactSystem, z: FloatArray, pairs: IntArray) -> str:
         return ''
     named = (f'{system.contact(int(p))} is {gap[p] * system.size:.3g} m apart' for p in missed)
     return '; ' + ', '.join(named)
+
+
+def _joint_limits(problem: Problem, grasp: Grasp, field: str, file: str) -> list[Finding]:
+    """Find joints outside their limits by more than rounding."""
+    return [
+        Finding(
+            file,
+            f'{field}.joints.{joint.name}',
+            f'{angle:.9g} rad',
+            f'an angle from {joint.lower:.9g} to {joint.upper:.9g} rad',
+        )
+        for joint, angle in zip(problem.hand.joints, grasp.joints, strict=True)
+        if not joint.lower - _ROUNDING <= angle <= joint.upper + _ROUNDING
+    ]
 
 
 def _overlaps(problem: Problem, grasp: Grasp, field: str, file: str) -> list[Finding]:

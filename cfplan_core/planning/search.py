@@ -133,13 +133,16 @@ class Search:
                 return False
             tree.frontier = [tree.add(Node(piece, None, None, 0))]
         self._look(self.trees[0].nodes[0].piece)
-        self._alternate()
+        # Among points and curves a complete tree is proof: the other can do no more.
+        while self.meeting is None and all(tree.frontier for tree in self._roots):
+            self._grow()
         if self.meeting is None:
             # Points and curves are exhausted: open contacts and cross regions.
             self._crossing = True
             for tree in self._roots:
                 tree.frontier = list(range(len(tree.nodes)))
-            self._alternate()
+            while self.meeting is None and any(tree.frontier for tree in self._roots):
+                self._grow()
         return self.meeting is not None
 
     def _look(self, piece: Piece) -> bool:
@@ -156,19 +159,15 @@ class Search:
             self.meeting = piece.index
         return found
 
-    def _alternate(self) -> None:
-        """Grow the smaller tree until they join or one is complete."""
-        while self.meeting is None and all(tree.frontier for tree in self._roots):
-            tree = min(self._roots, key=lambda tree: len(tree.frontier))
-            self._grow(tree)
-
     def _neighbours(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
         yield from self.roadmap.neighbours(piece)
         if self._crossing:
             yield from self.roadmap.regions.beside(piece)
 
-    def _grow(self, tree: Tree) -> None:
-        """Add a level to a tree; join at the common piece of least depth, if there is one."""
+    def _grow(self) -> None:
+        """Add a level to the tree with the smaller frontier; join at least depth if they meet."""
+        growing = [tree for tree in self._roots if tree.frontier]
+        tree = min(growing, key=lambda tree: len(tree.frontier))
         other = self.trees[1] if tree is self.trees[0] else self.trees[0]
         level = []
         best: tuple[int, int] | None = None

@@ -10,9 +10,11 @@ import numpy as np
 from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.mechanics.contact_model import ContactModel
+from cfplan_core.mechanics.contact_model import ContactModel, Stability
 from cfplan_core.planning.manifold import independent_rows, project
 from cfplan_core.planning.search import Leg
+from cfplan_core.planning.stability_classes import split_by_class
+from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
 from cfplan_core.trajectory.plan_result import Segment
 
 # Largest change between frames of a joint or of the object's angle, in rad, and of its position,
@@ -60,27 +62,22 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
         model: Gives the torque limits.
         legs: From start to goal, each beginning where the one before ends.
     """
+    tracer = Tracer(system, model)
     points: list[FloatArray] = []
     lower: list[FloatArray] = []
     upper: list[FloatArray] = []
     segments: list[Segment] = []
     first = 0
-    for index, leg in enumerate(legs):
-        z = _evenly(system, leg)
-        low, high = _torque_limits(system, model, leg, z)
-        segments.append(
-            Segment(
-                system.contact_names(leg.formation.pairs),
-                leg.stability.value,
-                first,
-                first + len(z) - 1,
-            )
-        )
-        shared = 0 if index == 0 else 1
-        points.append(z[shared:])
-        lower.append(low[shared:])
-        upper.append(high[shared:])
-        first += len(z) - 1
+    for leg in legs:
+        for stability, z in _parts(tracer, leg, _evenly(system, leg)):
+            low, high = _torque_limits(system, model, leg, z)
+            contacts = system.contact_names(leg.formation.pairs)
+            segments.append(Segment(contacts, stability.value, first, first + len(z) - 1))
+            shared = 1 if points else 0
+            points.append(z[shared:])
+            lower.append(low[shared:])
+            upper.append(high[shared:])
+            first += len(z) - 1
     z = np.concatenate(points)
     return Frames(
         _times(system, z[:, 3:]),
@@ -120,6 +117,14 @@ def _evenly(system: ContactSystem, leg: Leg) -> FloatArray:
             return points
         middles = _middles(system, leg, points[large], points[large + 1])
         points = np.insert(points, large + 1, middles, axis=0)
+
+
+def _parts(tracer: Tracer, leg: Leg, z: FloatArray) -> list[tuple[Stability, FloatArray]]:
+    """Frames of a leg by stability class: one part, but where a class was won or lost by a hair."""
+    inner = tracer.margins(leg.formation, z).form_closure[1:-1] > STABILITY_MARGIN
+    if (inner == (leg.stability is Stability.FORM_CLOSURE)).all():
+        return [(leg.stability, z)]
+    return split_by_class(tracer, leg.formation, z)
 
 
 def _middles(system: ContactSystem, leg: Leg, before: FloatArray, after: FloatArray) -> FloatArray:

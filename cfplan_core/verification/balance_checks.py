@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cfplan_core.verification.checks import BARELY, CHECKS, STRICT, UNBOUNDED
+from cfplan_core.verification.checks import BARELY, CHECKS, HAIR, STRICT, UNBOUNDED
 from cfplan_core.verification.mechanism import FloatArray, Mechanism, Scene
 from cfplan_core.verification.report import Recorder
 from cfplan_core.verification.second_order import second_order_margin
@@ -99,12 +99,13 @@ def check_class(hold: Hold, inside: bool, record: Recorder) -> None:
     """Check that the stability class is the one claimed.
 
     Form closure: W c = 0 with all c > 0; at the ends of a segment some c ≥ 0, not all zero.
-    Force closure: stable to first order and not form closure. Second order: neither.
+    Force closure: stable to first order and not form closure, or only by a hair. Second order:
+    neither.
     """
     if hold.stability == 'form_closure':
         holds = hold.closure >= STRICT if inside else internal_force(hold.balance) > 0.5
     elif hold.stability == 'force_closure':
-        holds = hold.closure <= (BARELY if inside else 10.0 * BARELY)
+        holds = hold.closure <= HAIR
     else:
         holds = not hold.spans or hold.least_force <= (STRICT if inside else 10.0 * BARELY)
     record.require(

@@ -21,6 +21,9 @@ STRICT = 1e-9
 BARELY = 1e-6
 """Contact force, in weights of the object, that rounding may hide at the end of a segment."""
 
+HAIR = 1e-4
+"""Form-closure margin up to which a grasp may also be called one of force closure."""
+
 UNBOUNDED = 1e6
 """Torque, in weights times sizes of the object, above which a limit is as good as none."""
 

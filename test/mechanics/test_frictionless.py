@@ -129,6 +129,14 @@ def test_form_closure_is_stable_by_no_smaller_a_margin(rows: FloatArray, load: F
     assert margins.stable[0] >= margins.form_closure[0]
 
 
+@pytest.mark.parametrize('count', [0, 1, 2])
+def test_two_contacts_are_not_stable(count: int) -> None:
+    rows = np.array([row(-1.0, -1.0, math.pi / 2), row(1.0, -1.0, math.pi / 2)])[:count]
+    margins = FrictionlessModel(DOWN).margins(rows[None])
+    assert margins.stable[0] < 0.0
+    assert margins.form_closure[0] < 0.0
+
+
 def limit_by_program(rows: FloatArray, load: FloatArray, joint: int, sign: float) -> float:
     """Largest of ± the torque -Jᵀ c over forces c ≥ 0 that balance the load."""
     program = solve(sign * rows[:, 3 + joint], (0.0, None), (rows[:, :3].T, -load))
@@ -167,6 +175,33 @@ def test_without_load_torques_are_zero_or_unbounded(rows: FloatArray) -> None:
     lower, upper = FrictionlessModel(NONE).torque_limits(rows[None])
     assert set(lower.flat) <= {0.0, -math.inf}
     assert set(upper.flat) <= {0.0, math.inf}
+
+
+@pytest.mark.parametrize('size', [1e-15, 1e-12, 1e-10, 1e-8])
+def test_redundant_contacts_that_rounding_makes_independent_do_not_change_the_limits(
+    size: float,
+) -> None:
+    """Five contacts on two lines, and one twice: many of their determinants are all but zero."""
+    rows = np.array(
+        [
+            row(-0.4, -0.4, math.pi / 2, 0.0, 0.0),
+            row(0.4, -0.4, math.pi / 2, 0.0, 0.0),
+            row(-0.4, 0.2, 0.0, -0.5, 0.0),
+            row(0.4, -0.2, math.pi, 0.0, 0.2),
+            row(0.4, -0.2, math.pi, 0.0, 0.2),
+            row(0.1, -0.4, math.pi / 2, 0.0, 0.0),
+            row(-0.4, 0.1, 0.0, -0.4, 0.0),
+        ]
+    )
+    disturbed = np.repeat(rows[None], 200, axis=0)
+    disturbed[..., :3] += size * np.random.default_rng(11).normal(size=(200, 7, 3))
+    model = FrictionlessModel(DOWN)
+    for found, expected in zip(
+        model.torque_limits(disturbed), model.torque_limits(rows[None]), strict=True
+    ):
+        np.testing.assert_allclose(
+            found, np.repeat(expected, 200, axis=0), atol=1e-12 + 100 * size
+        )
 
 
 def test_limits_of_a_batch_are_those_of_each() -> None:

@@ -74,6 +74,19 @@ def pushed_block(
     )
 
 
+# From its top down to 5 mm below the tip of the mast of `masted_block`, at x = 0.
+BARRIER = [(0.0, 0.045), (0.001, 0.1), (-0.001, 0.1)]
+
+
+def masted_block(palms: Sequence[Polygon] = (BARRIER,)) -> Problem:
+    """A block with a mast, 0.05 m high, left of a barrier that the mast cannot pass."""
+    outline = [(-HALF, 0.0), (HALF, 0.0), (HALF, 0.04), (0.0005, 0.04), (0.0, 0.05)]
+    outline += [(-0.0005, 0.04), (-HALF, 0.04)]
+    fingers = (finger('left', (-BASE, 0.0), tip(LEFT)), finger('right', (BASE, 0.0), tip(RIGHT)))
+    problem = _problem('masted', outline, fingers, pushed_angles(-0.003), palms)
+    return replace(problem, start=Grasp((-0.003, 0.0, 0.0), pushed_angles(-0.003)))
+
+
 def leaning_tower() -> Problem:
     """A high block between two fingertips, gravity pulling it over to the left.
 

@@ -120,7 +120,5 @@ def test_form_closure_between_two_points_without_it_is_found() -> None:
 def test_upright_sides_never_give_form_closure() -> None:
     system = ContactSystem(pushed_block())
     curve = np.array([at(system, x, pushed_angles(x)) for x in (-0.004, 0.0, 0.004)])
-    ((found, _),) = split_by_class(
-        tracer_of(system), formation(system, *FEET, *TIPS), curve
-    )
+    ((found, _),) = split_by_class(tracer_of(system), formation(system, *FEET, *TIPS), curve)
     assert found is FORCE

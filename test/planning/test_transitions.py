@@ -86,15 +86,11 @@ def test_block_leaves_a_wall_by_sliding_off_it_or_by_tipping() -> None:
     ('opened', 'x', 'angle'),
     [(WALL_CONTACT, 1, 0), (TIPS[0], 0, 0), (FEET[0], 1, -1), (FEET[1], -1, 1)],
 )
-def test_block_at_a_wall_moves_to_where_the_contact_opens(
-    opened: str, x: int, angle: int
-) -> None:
+def test_block_at_a_wall_moves_to_where_the_contact_opens(opened: str, x: int, angle: int) -> None:
     """Away from the wall without turning; or over its right foot clockwise, and likewise."""
     system, z = at_the_wall()
     ways = [
-        way
-        for way in leave(system, z)[0]
-        if opened in system.contact_names(list(way.departing))
+        way for way in leave(system, z)[0] if opened in system.contact_names(list(way.departing))
     ]
     (direction,) = (way.direction for way in ways)
     moves = np.where(np.abs(direction) < 1e-12, 0.0, np.sign(direction))
