@@ -17,7 +17,12 @@ _ITERATIONS = 12
 
 
 class GoalTest:
-    """Looks for a goal's object pose, joints and contacts on pieces."""
+    """Looks for a goal's object pose, joints and contacts on pieces.
+
+    Attributes:
+        columns: Coordinates of z that the goal gives, shape (m,).
+        wanted: Their values, shape (m,).
+    """
 
     def __init__(self, system: ContactSystem, goal: Goal) -> None:
         """Compile a goal of which at least one of pose, joints and contacts is given."""
@@ -38,17 +43,20 @@ class GoalTest:
             columns.append(3 + names.index(name))
             wanted.append(angle)
             tolerance.append(goal.tolerance.joints)
-        self._columns = np.array(columns, dtype=np.intp)
-        self._wanted = np.array(wanted)
+        self.columns = np.array(columns, dtype=np.intp)
+        self.wanted = np.array(wanted)
         self._tolerance = np.array(tolerance)
 
     def __call__(self, piece: Piece) -> FloatArray | None:
-        """Return a configuration of a piece, shape (3 + n,), that fulfils the goal, if any."""
-        if not self._pairs <= set(piece.formation.pairs):
+        """Return a configuration of a piece, shape (3 + n,), that fulfils the goal, if any.
+
+        Of a region only the anchor is looked at; `Regions.reach` drives further.
+        """
+        if not self.may_hold(piece):
             return None
-        if not len(self._columns):
+        if not len(self.columns):
             return np.asarray(piece.points[len(piece.points) // 2])
-        distance = np.abs(piece.points[:, self._columns] - self._wanted).max(axis=1)
+        distance = np.abs(piece.points[:, self.columns] - self.wanted).max(axis=1)
         for nearest in _local_minima(distance):
             if piece.dimension == 0:
                 z = piece.points[nearest]
@@ -58,9 +66,17 @@ class GoalTest:
                     continue
             else:
                 continue
-            if (np.abs(z[self._columns] - self._wanted) <= self._tolerance).all():
+            if self.fits(z):
                 return np.asarray(z)
         return None
+
+    def may_hold(self, piece: Piece) -> bool:
+        """Tell whether a piece has the contacts wanted."""
+        return self._pairs <= set(piece.formation.pairs)
+
+    def fits(self, z: FloatArray) -> bool:
+        """Tell whether a configuration has the coordinates wanted, within their tolerances."""
+        return bool((np.abs(z[self.columns] - self.wanted) <= self._tolerance).all())
 
     def _nearest(self, piece: Piece, z: FloatArray) -> FloatArray:
         """Gauss-Newton steps along a piece to where the wanted coordinates are nearest."""
@@ -69,8 +85,8 @@ class GoalTest:
             gradients = gap_gradients(self._system, self._system.place(z[None]), pairs)[0]
             rows = list(independent_rows(gradients))
             basis = tangent_basis(gradients[rows])
-            off = self._wanted - z[self._columns]
-            along = np.linalg.lstsq(basis[:, self._columns].T, off, rcond=1e-9)[0]
+            off = self.wanted - z[self.columns]
+            along = np.linalg.lstsq(basis[:, self.columns].T, off, rcond=1e-9)[0]
             found = project(self._system, pairs[rows], z, basis, (z + along @ basis)[None])
             if not found.converged[0]:
                 break

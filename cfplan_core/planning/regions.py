@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.system import BoolArray
+from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.events import OPEN_EVENTS, EventKind
@@ -67,6 +67,32 @@ class Regions:
             assert isinstance(piece, Region)
             self._beyond[piece.index] = list(self._shoot(piece))
         return self._beyond[piece.index]
+
+    def reach(self, region: Region, columns: IntArray, wanted: FloatArray) -> Iterator[FloatArray]:
+        """Drive some coordinates towards wanted values, shape (m,), inside a region.
+
+        First with all joints, then with each of the others held still: links may be in the way.
+
+        Yields:
+            Configurations, shape (3 + n,), linked to the region's anchor, where these coordinates
+            are as near as the manifold lets them come.
+        """
+
+        def steer(z: FloatArray, basis: FloatArray) -> FloatArray | None:
+            off = wanted - z[columns]
+            along = np.linalg.lstsq(basis[:, columns].T, off, rcond=1e-6)[0]
+            ahead = np.asarray(along @ basis)
+            return ahead if np.abs(ahead).max() > _ARRIVED else None
+
+        tracer = self._roadmap.tracer
+        free = [k for k in range(3, self._roadmap.system.dof) if k not in columns]
+        for held in ((), *((column,) for column in free)):
+            trace = tracer.follow(region.formation, region.anchor, steer, longest=10.0, held=held)
+            if trace.kind is not EventKind.TARGET:
+                continue
+            if len(split_by_class(tracer, region.formation, trace.points)) == 1:
+                region.links.append((trace.end, trace.points))
+                yield trace.end
 
     def _openings(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
         tracer = self._roadmap.tracer

@@ -17,7 +17,7 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.goal_test import GoalTest
-from cfplan_core.planning.pieces import Piece
+from cfplan_core.planning.pieces import Piece, Region
 from cfplan_core.planning.roadmap import Roadmap
 
 
@@ -109,7 +109,7 @@ class Search:
             start: Stable configuration, shape (3 + n,).
             goal: Stable configuration, shape (3 + n,), or a test that finds one on a piece.
             blocked: Indices of pieces that may not be used.
-            grown: Called with the numbers of nodes whenever one is added; may raise to interrupt.
+            grown: Called with the trees' numbers of nodes before one is added; may raise.
         """
         self.roadmap = roadmap
         self.trees = (Tree(start), Tree(start))
@@ -150,7 +150,7 @@ class Search:
         if self._test is None:
             found = piece.index in self.trees[1].index_of
         else:
-            goal = self._test(piece)
+            goal = self._fulfilled(self._test, piece)
             found = goal is not None
             if goal is not None:
                 self.trees[1].root = goal
@@ -158,6 +158,14 @@ class Search:
         if found:
             self.meeting = piece.index
         return found
+
+    def _fulfilled(self, test: GoalTest, piece: Piece) -> FloatArray | None:
+        """Where a piece fulfils a partial goal, shape (3 + n,)."""
+        goal = test(piece)
+        if goal is not None or not isinstance(piece, Region) or not test.may_hold(piece):
+            return goal
+        reached = self.roadmap.regions.reach(piece, test.columns, test.wanted)
+        return next((z for z in reached if test.fits(z)), None)
 
     def _neighbours(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
         yield from self.roadmap.neighbours(piece)
@@ -176,8 +184,8 @@ class Search:
             for entry, piece in self._neighbours(node.piece):
                 if piece.index in tree.index_of or piece.index in self._blocked:
                     continue
+                self._grown(*(len(t.nodes) + (t is tree) for t in self.trees))
                 level.append(tree.add(Node(piece, index, entry, node.depth + 1)))
-                self._grown(len(self.trees[0].nodes), len(self.trees[1].nodes))
                 if self._test is not None:
                     if self._look(piece):
                         return

@@ -28,7 +28,7 @@ def check_named_contacts(stretch: Stretch, frame: int, scene: Scene, record: Rec
     """Check that every contact of a segment touches, from outside."""
     for pair in stretch.contacts:
         touch = locate(pair, scene)
-        what = f'gap of {pair.name} in segment {stretch.index}'
+        what = f'gap of {pair.name} in segment {stretch.number}'
         if record.measure('contact_gap', touch.distance, frame, what):
             depth = touch.depth if touch.salient else math.inf
             notch = '' if touch.salient else ', which is not convex,'
@@ -66,7 +66,7 @@ def check_inside_contacts(
         'unnamed_contact',
         not others,
         frame,
-        f'segment {stretch.index} does not name {", ".join(others)}, expected all that touches',
+        f'segment {stretch.number} does not name {", ".join(others)}, expected all that touches',
     )
     points = [(pair, locate(pair, scene).point) for pair in stretch.contacts]
     for (one, p), (other, q) in combinations(points, 2):
@@ -92,6 +92,6 @@ def check_ends_alone(
         'unnamed_contact',
         not others,
         stretch.last,
-        f'segment {stretch.index} does not name {", ".join(others)}, which touches at both its '
+        f'segment {stretch.number} does not name {", ".join(others)}, which touches at both its '
         'ends, expected all that touches',
     )

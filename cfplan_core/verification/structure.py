@@ -20,14 +20,14 @@ class Stretch:
     """A segment whose contacts are resolved.
 
     Attributes:
-        index: Of the segment in the plan.
+        number: Of the segment in the plan, counted from 1 as in tables and figures.
         contacts: What touches in it.
         stability: The class that it claims.
         first: Its first frame.
         last: Its last frame.
     """
 
-    index: int
+    number: int
     contacts: tuple[Pair, ...]
     stability: str
     first: int
@@ -111,7 +111,7 @@ def _check_segments(result: PlanResult, record: Recorder) -> bool:
         'segments', bool(result.segments), None, 'the plan has no segments, expected some'
     )
     expected = 0
-    for k, segment in enumerate(result.segments):
+    for k, segment in enumerate(result.segments, start=1):
         first, last = segment.first_frame, segment.last_frame
         holds &= record.require(
             'segments',
@@ -141,7 +141,7 @@ def _resolve(
 ) -> tuple[Stretch, ...] | None:
     stretches: list[Stretch] = []
     holds = True
-    for k, segment in enumerate(result.segments):
+    for k, segment in enumerate(result.segments, start=1):
         holds &= record.require(
             'stability_class',
             segment.stability in CLASSES,

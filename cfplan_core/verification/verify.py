@@ -150,5 +150,5 @@ def _check_inside(
 
 
 def _hold(mechanism: Mechanism, stretch: Stretch, frame: int, scene: Scene) -> Hold:
-    owner = f'segment {stretch.index}'
+    owner = f'segment {stretch.number}'
     return Hold(mechanism, frame, scene, stretch.contacts, owner, stretch.stability)
