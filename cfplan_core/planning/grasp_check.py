@@ -24,6 +24,8 @@ TOUCHING = 1e-6
 _ROUNDING = 1e-9
 # Gaps up to this part of the object's size are named when a grasp is not stable.
 _NEAR = 0.05
+# Gaps up to this part of it are closed in the grasp that is proposed instead.
+_CLOSE = 0.02
 
 
 @dataclass(frozen=True)
@@ -224,7 +226,25 @@ def _near_misses(system: ContactSystem, z: FloatArray, pairs: IntArray) -> str:
     if not missed:
         return ''
     named = (f'{system.contact(int(p))} is {gap[p] * system.size:.3g} m apart' for p in missed)
-    return '; ' + ', '.join(named)
+    return '; ' + ', '.join(named) + _remedy(system, z)
+
+
+def _remedy(system: ContactSystem, z: FloatArray) -> str:
+    """Say which grasp near by touches with all contacts that nearly do, if there is one."""
+    pairs = touching(system, z, _CLOSE)
+    settled = settle(system, z, pairs)
+    exact = TOUCHING / system.size
+    meant = set(pairs.tolist()) <= set(touching(system, settled, exact).tolist())
+    if not meant or coincident(system, settled, pairs, exact).any():
+        return ''
+    pose = ', '.join(f'{value:.9f}' for value in _rounded(system.object_poses(settled[None])[0]))
+    joints = ', '.join(f'{value:.9f}' for value in _rounded(settled[3:]))
+    return f' (all {len(pairs)} near by touch at object_pose [{pose}], joints [{joints}])'
+
+
+def _rounded(values: FloatArray) -> FloatArray:
+    """Nine decimals, and no minus before a zero."""
+    return np.asarray(np.round(values, 9) + 0.0)
 
 
 def _joint_limits(problem: Problem, grasp: Grasp, field: str, file: str) -> list[Finding]:

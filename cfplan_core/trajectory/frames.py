@@ -120,7 +120,7 @@ def _evenly(system: ContactSystem, leg: Leg) -> FloatArray:
 
 
 def _parts(tracer: Tracer, leg: Leg, z: FloatArray) -> list[tuple[Stability, FloatArray]]:
-    """Frames of a leg by stability class: one part, but where a class was won or lost by a hair."""
+    """Frames of a leg by stability class: one part, but where it changes between samples."""
     inner = tracer.margins(leg.formation, z).form_closure[1:-1] > STABILITY_MARGIN
     if (inner == (leg.stability is Stability.FORM_CLOSURE)).all():
         return [(leg.stability, z)]

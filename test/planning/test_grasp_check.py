@@ -170,7 +170,8 @@ def test_object_that_touches_nothing_is_told_what_it_nearly_touches() -> None:
     field, value, expected = only_finding(block((0.0, 0.001, 0.0), fingers=[]))
     assert field == 'start'
     assert value == (
-        'no contact; object.v0|palm.0.e2 is 0.001 m apart, object.v1|palm.0.e2 is 0.001 m apart'
+        'no contact; object.v0|palm.0.e2 is 0.001 m apart, object.v1|palm.0.e2 is 0.001 m apart '
+        '(all 2 near by touch at object_pose [0.000000000, 0.000000000, 0.000000000], joints [])'
     )
     assert expected == 'contacts within 1e-06 m that hold the object'
 
