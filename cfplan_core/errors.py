@@ -18,7 +18,7 @@ class Finding:
         file: Path of the file as the user gave it, or ``'<problem>'`` for data in memory.
         field: Dotted path of the field, e.g. ``hand.fingers[0].joints[0].limits``.
         value: What was found there, shortened for print.
-        expected: What would have been right, with its unit.
+        expected: What would have been right, with its unit; empty if the value says it all.
     """
 
     file: str
@@ -27,6 +27,8 @@ class Finding:
     expected: str
 
     def __str__(self) -> str:
+        if not self.expected:
+            return ': '.join(part for part in (self.file, self.field, self.value) if part)
         where = self.field or '(top level)'
         return f'{self.file}: {where}: got {self.value}, expected {self.expected}'
 

@@ -103,10 +103,11 @@ def _candidates(rng: np.random.Generator, seed: int) -> Iterator[Problem]:
         left, right = rng.uniform(0.05, 0.12, size=2)
         pose = np.array([rng.uniform(-apart / 2, apart / 2), 0.0, 0.0])
         outline = thing.world_vertices(pose)
+        base = np.array([apart, 0.0])
         # The left finger comes from the left, the right one is its mirror image.
         joints = (
-            _turn_to(outline + [apart, 0.0], left),
-            math.pi - _turn_to(outline * [-1.0, 1.0] + [apart, 0.0], right),
+            _turn_to(base + outline, left),
+            math.pi - _turn_to(base + outline * [-1.0, 1.0], right),
         )
         hand = Hand((PALM,), (_finger('left', -apart, left), _finger('right', apart, right)))
         if all(LIMITS[0] < angle < LIMITS[1] for angle in joints):

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     '--output',
     type=click.Path(dir_okay=False, path_type=Path),
     metavar='OUT',
-    help='A .gif or .mp4 file; without it the plan with the suffix .gif.',
+    help='A .gif or .mp4 file, without it the plan with the suffix .gif; missing directories '
+    'are created.',
 )
 def animate(plan_path: Path, problem_path: Path | None, output: Path | None) -> int:
     """Draw the file PLAN as a GIF or MP4.

@@ -54,12 +54,13 @@ def _bodies(problem: Problem) -> Table:
         table.add_row(name, str(len(vertices)), 'fixed')
     for finger in problem.hand.fingers:
         for link in finger.links:
-            table.add_row(f'{finger.name}.{link.name}', str(len(link.vertices)), f'{link.mass:g}')
+            mass = f'{link.mass:g}' if link.mass else 'massless'
+            table.add_row(f'{finger.name}.{link.name}', str(len(link.vertices)), mass)
     return table
 
 
 def _joints(problem: Problem) -> Table:
-    table = new_table('Joints', 'Joint', 'Limits (rad)', 'Speed (rad/s)', 'Torque (N m)')
+    table = new_table('Joints', 'Joint', 'Limits (rad)', 'Speed (rad/s)', 'Torque (N·m)')
     for joint in problem.hand.joints:
         table.add_row(
             joint.name,
@@ -77,7 +78,8 @@ def _print_grasp(title: str, problem: Problem, grasp: Grasp, console: Console) -
     angles = zip(problem.hand.joint_names, grasp.joints, strict=True)
     console.print(_formation(f'{title} contact formation', described.contacts))
     console.print(
-        f'{described.stability.replace("_", " ")}, dimension {described.dimension}\n'
+        f'{described.stability.replace("_", " ")}, dimension {described.dimension} '
+        '(independent motions that keep these contacts)\n'
         f'{_pose(grasp.object_pose)}\n{_angles(angles)}\n'
     )
 
@@ -104,7 +106,7 @@ def _angles(joints: Iterable[tuple[str, float]]) -> str:
 
 def _formation(title: str, contacts: Iterable[str]) -> Table:
     """A contact formation in the form of Table 1 of Trinkle & Hunter (1991)."""
-    table = new_table(title, 'Object Element', 'Link', 'Hand Element')
+    table = new_table(title, 'Object element', 'Body', 'Hand element')
     for contact in contacts:
         table.add_row(*table_1_row(contact))
     return table

@@ -55,14 +55,14 @@ def _finite_seconds(
     'json_path',
     type=click.Path(dir_okay=False, path_type=Path),
     metavar='OUT',
-    help='Write the result here as JSON, whatever the outcome.',
+    help='Write the result here as JSON, whatever the outcome; missing directories are created.',
 )
 @click.option(
     '--figures',
     'figure_directory',
     type=click.Path(file_okay=False, path_type=Path),
     metavar='DIR',
-    help='Draw the figures into this directory.',
+    help='Draw the figures into this directory; it is created if missing.',
 )
 @click.option(
     '--time-budget',
@@ -75,7 +75,7 @@ def _finite_seconds(
     '--max-nodes',
     type=click.IntRange(min=1),
     metavar='N',
-    help='Give up when the two trees have N nodes together.',
+    help='Give up once the two trees have N nodes or more together.',
 )
 def plan(
     file: Path,
@@ -197,3 +197,5 @@ def _print(problem: Problem, result: PlanResult, figures: list[Path]) -> None:
     print_plan(result, console, problem)
     for figure in figures:
         console.print(f'Figure: {figure}', soft_wrap=True)
+    if figures and not result.solved:
+        console.print('Figures 4, 6 and 7 show a plan; there is none.')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ from rich.table import Table
 from cfplan_core.command_line.console import answers, new_table
 
 if TYPE_CHECKING:
-    from cfplan_core.verification import Check, VerificationReport
+    from cfplan_core.verification import Check
 
 REFUTED = 1
 
@@ -19,10 +20,12 @@ REFUTED = 1
 @click.command(short_help='Certify a plan by a second method.')
 @click.argument('problem_path', metavar='PROBLEM', type=click.Path(path_type=Path))
 @click.argument('plan_path', metavar='PLAN', type=click.Path(path_type=Path))
-def verify(problem_path: Path, plan_path: Path) -> int:
+@click.option('-v', '--verbose', is_flag=True, help='List every check, also those that pass.')
+def verify(problem_path: Path, plan_path: Path, verbose: bool) -> int:
     """Certify, frame by frame, that the file PLAN solves the file PROBLEM.
 
-    Shares no code with the planner's mechanics.
+    Shares no code with the planner's mechanics. Lists the checks that fail, and what is wrong in
+    the first frame that fails.
 
     Exit status: 0 certified, 1 not, 2 invalid input or usage.
     """
@@ -32,10 +35,14 @@ def verify(problem_path: Path, plan_path: Path) -> int:
 
     report = verify_plan(load_problem(problem_path), read_plan(plan_path))
     console = answers()
-    console.print(_table(report))
+    shown = [check for check in report.checks if verbose or not check.ok]
+    if shown:
+        console.print(_table(f'Verification of {report.problem}', shown))
     first = report.first_failure
     if first is None:
-        console.print(f'Certified: {report.frames} frames pass every check.')
+        applied = sum(check.count > 0 for check in report.checks)
+        frames = f'{report.frames} frame{"s pass" if report.frames != 1 else " passes"}'
+        console.print(f'Certified: {frames} {applied} checks.')
         return 0
     where = 'the plan as a whole' if first.frame is None else f'frame {first.frame}'
     console.print(f'Not certified. First failure: {where}', soft_wrap=True)
@@ -45,12 +52,12 @@ def verify(problem_path: Path, plan_path: Path) -> int:
     return REFUTED
 
 
-def _table(report: VerificationReport) -> Table:
-    table = new_table(f'Verification of {report.problem}')
+def _table(title: str, checks: Iterable[Check]) -> Table:
+    table = new_table(title)
     table.add_column('Check')
     for heading in ('Failed', 'Worst', 'Frame', 'Limit'):
         table.add_column(heading, justify='right')
-    for check in report.checks:
+    for check in checks:
         worst, limit = _measure(check)
         table.add_row(
             check.description,

@@ -125,7 +125,7 @@ def _with_parts(
             continue
         path = FilePath(directory, reference)
         files[key] = str(path)
-        value, part_faults = read_yaml(path, f'{contents}, named in {file}')
+        value, part_faults = read_yaml(path, contents, file)
         faults += [
             Fault((key, *fault.path), fault.value, fault.expected, fault.usable)
             for fault in part_faults

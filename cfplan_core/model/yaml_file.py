@@ -34,7 +34,7 @@ class _Unreadable(Exception):
         super().__init__(str(fault))
 
 
-def read_yaml(path: FilePath, contents: str) -> tuple[object, list[Fault]]:
+def read_yaml(path: FilePath, contents: str, named_in: str = '') -> tuple[object, list[Fault]]:
     """Read a YAML 1.1 file of one document.
 
     Keys are taken as the text that they are written as, dates as text.
@@ -42,29 +42,29 @@ def read_yaml(path: FilePath, contents: str) -> tuple[object, list[Fault]]:
     Args:
         path: The file.
         contents: What it should hold, for the faults.
+        named_in: The file that refers to it, for the faults; empty if none does.
 
     Returns:
         Dictionaries, lists, texts, numbers, truth values and None (None also if the file cannot
         be read), and what is wrong.
     """
     try:
-        return _Converter().document(_text(path, contents))
+        return _Converter().document(_text(path, contents, named_in))
     except _Unreadable as stop:
         return None, [stop.fault]
 
 
-def _text(path: FilePath, contents: str) -> bytes:
-    expected = f'a readable YAML file: {contents}'
+def _text(path: FilePath, contents: str, named_in: str) -> bytes:
+    origin = f', named in {named_in}' if named_in else ''
     try:
         with path.open('rb') as stream:
             text = stream.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, 'strerror', None) or str(error)
-        raise _Unreadable(Fault((), f'an error: {reason}', expected)) from None
+        raise _Unreadable(Fault((), f'{reason[:1].lower()}{reason[1:]}{origin}', '')) from None
     if len(text) > LARGEST_FILE:
-        raise _Unreadable(
-            Fault((), 'a larger file', f'{expected}, at most {LARGEST_FILE} bytes long')
-        )
+        expected = f'{contents}{origin}, in at most {LARGEST_FILE} bytes'
+        raise _Unreadable(Fault((), 'a larger file', expected))
     return text
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from cfplan_core.contact.elements import parse_contact
 from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem
+from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Goal
 from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
@@ -40,12 +41,18 @@ class GoalTest:
             tolerance += [goal.tolerance.position / system.size] * 2 + [goal.tolerance.angle]
         names = system.problem.hand.joint_names
         for name, angle in (goal.joints or {}).items():
+            if name not in names:
+                raise CfplanError(f'joint {name!r}: expected one of {", ".join(names)}')
             columns.append(3 + names.index(name))
             wanted.append(angle)
             tolerance.append(goal.tolerance.joints)
         self.columns = np.array(columns, dtype=np.intp)
         self.wanted = np.array(wanted)
         self._tolerance = np.array(tolerance)
+        if not columns and not self._pairs:
+            raise CfplanError('expected at least one of object pose, joints and contacts')
+        if not np.isfinite(self.wanted).all():
+            raise CfplanError(f'got {wanted}, expected finite numbers')
 
     def __call__(self, piece: Piece) -> FloatArray | None:
         """Return a configuration of a piece, shape (3 + n,), that fulfils the goal, if any.

@@ -138,9 +138,13 @@ def examine_grasp(
         field: Name of the grasp in findings, ``start`` or ``goal``.
         file: Named in findings.
     """
+    z = system.configuration(grasp)
+    if not np.isfinite(z).all():
+        found = Finding(file, field, 'a number that is not finite', 'finite m and rad')
+        nothing = np.empty(0, dtype=np.intp)
+        return ExaminedGrasp(z, nothing, Stability.UNSTABLE, system.dof, (found,))
     findings = _joint_limits(system.problem, grasp, field, file)
     findings += _overlaps(system.problem, grasp, field, file)
-    z = system.configuration(grasp)
     pairs = touching(system, z, TOUCHING / system.size)
     dimension, stability = system.dof, Stability.UNSTABLE
     if len(pairs):

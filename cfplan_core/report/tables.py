@@ -31,7 +31,7 @@ def plan_table(result: PlanResult, problem: Problem | None = None) -> Group:
             Text(),
             _titled('Segments', _segment_table(result)),
             _titled('Joint angles (rad)', _joint_table(result, problem)),
-            _titled('Torque limits (N m), least and greatest', _torque_table(result)),
+            _titled('Torque limits (N·m)', _torque_table(result)),
         )
     parts: list[RenderableType] = [_headline(result), Text(), _search_table(result)]
     if result.statistics.failures:
@@ -52,11 +52,16 @@ def _headline(result: PlanResult) -> Text:
         text.append(f'\n{result.message}')
     if result.solved:
         text.append(
-            f'\n{len(result.segments)} segments, {len(result.times)} frames, '
+            f'\n{_count(len(result.segments), "segment")}, '
+            f'{_count(len(result.times), "frame")}, '
             f'{result.times[-1] - result.times[0]:.2f} s of motion; '
             f'planned in {result.statistics.planning_time:.3g} s'
         )
     return text
+
+
+def _count(number: int, thing: str) -> str:
+    return f'{number} {thing}{"" if number == 1 else "s"}'
 
 
 def _new_table() -> Table:
@@ -107,7 +112,7 @@ def _joint_table(result: PlanResult, problem: Problem | None) -> Table:
 def _torque_table(result: PlanResult) -> Table:
     table = _new_table()
     table.add_column('Joint', overflow='fold')
-    for name in ('Lower limit', 'Upper limit', 'Narrowest interval'):
+    for name in ('Range of lower limit', 'Range of upper limit', 'Narrowest interval'):
         table.add_column(name, justify='right')
     for k, name in enumerate(result.joint_names):
         lower, upper = result.torque_lower[:, k], result.torque_upper[:, k]
@@ -155,5 +160,5 @@ def _failure_table(result: PlanResult) -> Table:
         table.add_row(str(times), Text(reason))
     rest = failures[MOST_FAILURES:]
     if rest:
-        table.add_row(str(sum(times for _, times in rest)), f'{len(rest)} other reasons')
+        table.add_row(str(sum(times for _, times in rest)), _count(len(rest), 'other reason'))
     return table

@@ -72,7 +72,8 @@ def _parse(name: str) -> Any:
         with open(name, encoding='utf-8') as file:
             return json.load(file, object_pairs_hook=unique)
     except OSError as error:
-        raise _invalid(name, '', error.strerror or str(error), 'a file to read') from None
+        reason = error.strerror or str(error)
+        raise _invalid(name, '', reason[:1].lower() + reason[1:], '') from None
     except UnicodeDecodeError:
         raise _invalid(name, '', 'bytes that are not UTF-8', 'JSON text in UTF-8') from None
     except json.JSONDecodeError as error:

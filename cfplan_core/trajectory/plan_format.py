@@ -32,7 +32,9 @@ def refuse_malformed(document: Any, name: str) -> None:
     Raises:
         InvalidPlanError: Says file, field, value and what was expected, for everything wrong.
     """
-    complaints = list(_schema_complaints(document)) or list(_content_complaints(document))
+    # jsonschema reports each missing key by itself; the complaint already names them all.
+    complaints = list(dict.fromkeys(_schema_complaints(document)))
+    complaints = complaints or list(_content_complaints(document))
     if complaints:
         lines = [str(Finding(name, *complaint)) for complaint in complaints[:MOST_FINDINGS]]
         if len(complaints) > MOST_FINDINGS:

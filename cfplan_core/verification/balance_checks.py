@@ -136,7 +136,7 @@ def check_torques(holds: Sequence[Hold], claimed: Limits, inside: bool, record: 
     error, what = min(errors)
     frame = holds[0].frame
     record.measure('torque_limits' if inside else 'torque_limits_at_ends', error, frame, what)
-    what = 'least effort that holds the object, by the effort limits,'
+    what = 'least effort that holds the object, divided by the effort limits,'
     record.measure('effort', min(efforts), frame, what)
 
 

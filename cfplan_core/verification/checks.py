@@ -59,15 +59,17 @@ CHECKS = {
     'arrays': Rule('arrays have one row per frame, one column per joint, and finite numbers'),
     'time': Rule('time strictly increases'),
     'segments': Rule('segments cover all frames, neighbours share one'),
-    'start': Rule('the first frame is the start grasp, by its rounding', 1.0),
-    'goal_position': Rule('the last object position, by its tolerance', 1.0),
-    'goal_angle': Rule('the last object angle, not modulo 2π, by its tolerance', 1.0),
-    'goal_joints': Rule('the last joint angles, by their tolerance', 1.0),
+    'start': Rule('the plan begins at the start: offset / what rounding allows', 1.0),
+    'goal_position': Rule('the object ends at the goal position: offset / tolerance', 1.0),
+    'goal_angle': Rule(
+        'the object ends at the goal angle, turns counted: offset / tolerance', 1.0
+    ),
+    'goal_joints': Rule('the joints end at the goal: offset / tolerance', 1.0),
     'goal_contacts': Rule('the contacts that the goal names touch', TOUCH, 'm'),
     'joint_limits': Rule('joints stay within their limits: excess', 1e-9, 'rad'),
-    'joint_velocity': Rule('joint speeds, by their limit', 1.0 + 1e-9),
+    'joint_velocity': Rule('joint speeds / velocity limit', 1.0 + 1e-9),
     'joint_step': Rule('joint motion between frames', 0.05 + 1e-9, 'rad'),
-    'object_step': Rule('object motion between frames, by its size', 0.05 + 1e-9),
+    'object_step': Rule('object motion between frames / object size', 0.05 + 1e-9),
     'object_turn': Rule('object rotation between frames', 0.05 + 1e-9, 'rad'),
     'contact_gap': Rule('named contacts touch: vertex to edge', TOUCH, 'm'),
     'contact_side': Rule('named contacts touch from outside: depth', 2.0 * TOUCH, 'm'),
@@ -76,14 +78,18 @@ CHECKS = {
     'penetration': Rule('the object does not penetrate the hand', TOUCH, 'm'),
     'link_overlap': Rule('links do not overlap', TOUCH, 'm'),
     'rank': Rule('wrenches span wrench space: smallest singular value', 1e-6, '', True),
-    'stability': Rule('every contact can press: least force, in weights', STRICT, '', True),
-    'stability_at_ends': Rule('the same at the ends of segments', -BARELY, '', True),
+    'stability': Rule(
+        'every contact can press: least force inside segments, in weights', STRICT, '', True
+    ),
+    'stability_at_ends': Rule(
+        'least force at the ends of segments, in weights', -BARELY, '', True
+    ),
     'stability_class': Rule('the stability class is the one claimed'),
-    'torque_limits': Rule('torque limits, relative error', 1e-6),
-    'torque_limits_at_ends': Rule('the same at the ends of segments', 1e-5),
-    'effort': Rule('an equilibrium within the effort limits exists: effort by limit', 1.0 + 1e-9),
-    'between_gap': Rule('gaps half-way between frames, by lever and turn squared', 0.25),
-    'between_motion': Rule('distance from half-way to the contacts, by the step', 0.25),
-    'between_penetration': Rule('penetration half-way between frames, by size', 1e-3),
+    'torque_limits': Rule('torque limits inside segments: relative error', 1e-6),
+    'torque_limits_at_ends': Rule('torque limits at the ends of segments: relative error', 1e-5),
+    'effort': Rule('the joints are strong enough: effort needed / effort limit', 1.0 + 1e-9),
+    'between_gap': Rule('gaps half-way between frames / (lever × turn²)', 0.25),
+    'between_motion': Rule('distance from half-way to the contacts / step', 0.25),
+    'between_penetration': Rule('penetration half-way between frames / object size', 1e-3),
 }
 """Every check by name, in the order in which they are reported."""

@@ -31,7 +31,8 @@ def check_limits(mechanism: Mechanism, result: PlanResult, record: Recorder) -> 
                 'joint_velocity',
                 speed / joint.velocity_limit,
                 frame,
-                f'speed of {joint.name} since the frame before, {speed:.6g} rad/s, by its limit',
+                f'speed of {joint.name} since the frame before, {speed:.6g} rad/s, divided by its '
+                'limit,',
             )
 
 
@@ -51,7 +52,8 @@ def check_steps(
             step = float(joint_steps[frame - 1, column])
             record.measure('joint_step', step, frame, f'motion of {name} since the frame before')
         moved = abs(scenes[frame].center - scenes[frame - 1].center) / mechanism.size
-        record.measure('object_step', moved, frame, 'motion of the object since the frame before')
+        what = 'motion of the object since the frame before, divided by its size,'
+        record.measure('object_step', moved, frame, what)
         turn = float(turns[frame - 1])
         record.measure('object_turn', turn, frame, 'rotation of the object since the frame before')
 
@@ -72,13 +74,16 @@ def check_start(
     allowed = TOUCH + PROJECTION * max((gap for gap in gaps if gap <= TOUCH), default=0.0)
     shift = result.object_poses[0] - start.object_pose
     record.measure(
-        'start', math.hypot(*shift[:2]) / allowed, 0, 'object position off the start, by rounding'
+        'start',
+        math.hypot(*shift[:2]) / allowed,
+        0,
+        'object position off the start, divided by what rounding allows,',
     )
     record.measure(
         'start',
         abs(float(shift[2])) * mechanism.size / allowed,
         0,
-        f'object angle off the start by {shift[2]:.6g} rad, by rounding,',
+        f'object angle off the start by {shift[2]:.6g} rad, divided by what rounding allows,',
     )
     links = [link for finger in problem.hand.fingers for link in finger.links]
     offsets = result.joints[0] - start.joints
@@ -88,7 +93,7 @@ def check_start(
             'start',
             abs(float(offset)) * reach / allowed,
             0,
-            f'{name} off the start by {offset:.6g} rad, by rounding,',
+            f'{name} off the start by {offset:.6g} rad, divided by what rounding allows,',
         )
 
 
@@ -105,7 +110,8 @@ def check_goal(mechanism: Mechanism, result: PlanResult, scene: Scene, record: R
             'goal_position',
             math.hypot(*shift[:2]) / goal.tolerance.position,
             last,
-            f'object position off the goal by {math.hypot(*shift[:2]):.6g} m, by tolerance,',
+            f'object position off the goal by {math.hypot(*shift[:2]):.6g} m, divided by the '
+            'tolerance,',
         )
         turns = round(float(shift[2]) / math.tau)
         hint = f' ({turns} whole turns and a rest)' if turns else ''
@@ -113,7 +119,7 @@ def check_goal(mechanism: Mechanism, result: PlanResult, scene: Scene, record: R
             'goal_angle',
             abs(float(shift[2])) / goal.tolerance.angle,
             last,
-            f'object angle off the goal by {shift[2]:.6g} rad{hint}, by tolerance,',
+            f'object angle off the goal by {shift[2]:.6g} rad{hint}, divided by the tolerance,',
         )
     columns = {name: k for k, name in enumerate(result.joint_names)}
     for name, angle in (goal.joints or {}).items():
@@ -125,7 +131,7 @@ def check_goal(mechanism: Mechanism, result: PlanResult, scene: Scene, record: R
             'goal_joints',
             abs(offset) / goal.tolerance.joints,
             last,
-            f'{name} off the goal by {offset:.6g} rad, by tolerance,',
+            f'{name} off the goal by {offset:.6g} rad, divided by the tolerance,',
         )
     for name in goal.contacts or ():
         try:

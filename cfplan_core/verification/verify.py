@@ -123,15 +123,15 @@ def _check_steps(
         middle = halfway(mechanism, scenes[frame - 1], scenes[frame], stretch.contacts)
         bend = max(0.0, middle.gap - TOUCH) / (mechanism.lever * max(middle.turn, 1e-9) ** 2)
         half = 'half-way from the frame before'
-        what = f'gap of {middle.gap:.3g} m {half}, by lever and turn squared,'
+        what = f'gap of {middle.gap:.3g} m {half}, divided by lever and turn squared,'
         record.measure('between_gap', bend, frame, what)
         detour = middle.detour if middle.reached else math.inf
-        what = f'distance of the contacts {half}, by the step,'
+        what = f'distance of the contacts {half}, divided by the step,'
         if not record.measure('between_motion', detour, frame, what):
             continue
         for body, outline in middle.scene.outlines.items():
             depth = overlap_depth(middle.scene.object, outline) / mechanism.size
-            what = f'depth of the object in {body} {half}, by its size,'
+            what = f'depth of the object in {body} {half}, divided by its size,'
             record.measure('between_penetration', depth, frame, what)
         if stretch.last == stretch.first + 1:
             # Without a frame inside the segment this is the only place to look at its inside.

@@ -25,7 +25,7 @@ def test_bodies_and_joints_are_listed(cfplan: Cfplan, problem_file: Path) -> Non
     rows = _rows(result.output)
     assert ('object', '4', '0.1') in rows
     assert ('palm.0', '4', 'fixed') in rows
-    assert ('right.link_2', '4', '0') in rows
+    assert ('right.link_2', '4', 'massless') in rows
     assert ('left_joint', '0.03 to 3.112', '1', '5') in rows
 
 

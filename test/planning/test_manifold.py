@@ -22,7 +22,13 @@ from planning.scenes import (
 from cfplan_core.contact.gaps import gap_gradients, gaps
 from cfplan_core.contact.system import ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.planning.manifold import independent_rows, project, settle, tangent_basis
+from cfplan_core.planning.manifold import (
+    Chart,
+    independent_rows,
+    project,
+    settle,
+    tangent_basis,
+)
 
 SYSTEM = ContactSystem(pushed_block())
 START = at(SYSTEM, 0.0, pushed_angles(0.0))
@@ -121,6 +127,20 @@ def test_projection_keeps_coordinates_along_the_tangent(shift: FloatArray) -> No
     assert found.converged.all()
     np.testing.assert_allclose(basis @ (found.points[0] - START), basis @ shift, atol=1e-12)
     assert largest_gap(found.points[0], pairs) < 1e-14
+
+
+def test_chart_gives_points_of_the_manifold_between_two_others() -> None:
+    """Their coordinates along the tangent divide those of the ends."""
+    pairs = rows(*FEET, *TIPS)
+    basis = tangent_basis(gap_gradients(SYSTEM, SYSTEM.place(START[None]), pairs)[0])
+    chart = Chart(SYSTEM, pairs, START, basis, np.empty((0, SYSTEM.dof)))
+    before, after = (at(SYSTEM, x, pushed_angles(x)) for x in (-0.001, 0.002))
+    fractions = np.array([0.0, 0.3, 1.0])
+    points = chart.between(before, after, fractions)
+    np.testing.assert_allclose(points[[0, 2]], [before, after], atol=1e-14)
+    assert largest_gap(points[1], pairs) < 1e-14
+    along = (points - before) @ basis[0]
+    np.testing.assert_allclose(along, fractions * along[2], atol=1e-14)
 
 
 def test_settling_lowers_a_block_onto_the_palm() -> None:

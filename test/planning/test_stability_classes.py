@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -71,7 +72,7 @@ def test_curve_is_cut_where_the_lines_of_force_pass_a_foot(count: int) -> None:
 
 def test_neighbours_share_a_point_that_still_has_form_closure() -> None:
     parts = split(*np.linspace(*ENDS, 9))
-    for (_, before), (_, after) in zip(parts[:-1], parts[1:], strict=True):
+    for (_, before), (_, after) in pairwise(parts):
         np.testing.assert_array_equal(before[-1], after[0])
         margin = tracer_of(TRAPEZOID).margins(KEPT, before[-1:]).form_closure[0]
         assert 0.0 < margin < 1e-4

@@ -29,7 +29,7 @@ from planning.scenes import (
 from random_problems import explore, random_problem
 
 from cfplan_core.contact.elements import parse_contact
-from cfplan_core.contact.gaps import gaps
+from cfplan_core.contact.gaps import gaps, wedge_lifts
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
@@ -193,6 +193,37 @@ def test_curves_of_random_problems_are_the_same_forwards_and_backwards(seed: int
             np.testing.assert_allclose(trace.end, end, atol=1e-9)
             count += 1
     assert count >= 4
+
+
+def off_their_root(system: ContactSystem, trace: Trace) -> float:
+    """How far the functions are from zero whose roots a trace's events are, the largest."""
+    placed = system.place(trace.end[None])
+    pairs = np.array(trace.pairs, dtype=np.intp)
+    if trace.kind is EventKind.JOINT_LIMIT:
+        angles = trace.end[3:][pairs]
+        limits = np.stack([system.lower[pairs], system.upper[pairs]])
+        return float(np.abs(angles - limits).min(axis=0).max())
+    gap, offset = (values[0] for values in gaps(system, placed, pairs))
+    if trace.kind is EventKind.EDGE_END:
+        return float(np.minimum(np.abs(offset), np.abs(offset - system.pair_length[pairs])).max())
+    if trace.kind in (EventKind.FLUSH_AFTER, EventKind.FLUSH_BEFORE):
+        side = 0 if trace.kind is EventKind.FLUSH_AFTER else 1
+        return float(np.abs(wedge_lifts(system, placed, pairs)[side]).max())
+    return float(np.abs(gap).max())
+
+
+@pytest.mark.parametrize('seed', range(40))
+def test_events_on_curves_of_random_problems_lie_on_their_roots(seed: int) -> None:
+    explored = explore(random_problem(seed))
+    tracer, system = explored.roadmap.tracer, explored.system
+    for piece in explored.pieces:
+        if piece.dimension == 1:
+            middle = len(piece.points) // 2
+            start, before = piece.points[middle], piece.points[middle - 1]
+            for heading in (start - before, before - start):
+                trace = tracer.follow(piece.formation, start, onwards(heading))
+                if trace.kind is not EventKind.UNSTABLE:
+                    assert off_their_root(system, trace) < 1e-9
 
 
 def test_trapezoid_is_followed_through_a_change_of_its_class() -> None:

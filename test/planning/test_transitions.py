@@ -149,7 +149,7 @@ def holds(wrenches: FloatArray, load: FloatArray) -> bool:
         bounds=[(0.0, None)] * count + [(None, 1.0)],
     )
     spans = np.linalg.matrix_rank(wrenches, tol=1e-7) == 3
-    return bool(spans and found.status == 0 and found.x[-1] > 1e-7)
+    return bool(spans and found.x is not None and found.x[-1] > 1e-7)
 
 
 def overlap(system: ContactSystem, z: FloatArray) -> float:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -140,7 +141,7 @@ def test_segments_cover_all_frames_and_share_their_ends(name: str, cases: dict[s
     segments = frames.segments
     assert segments[0].first_frame == 0
     assert segments[-1].last_frame == len(frames.times) - 1
-    for before, after in zip(segments[:-1], segments[1:], strict=True):
+    for before, after in pairwise(segments):
         assert before.last_frame == after.first_frame
     assert all(segment.first_frame < segment.last_frame for segment in segments)
 
@@ -230,7 +231,7 @@ def torque_limits(
         for lever in np.array(levers).T:
             found = linprog(sign * lever, A_eq=np.array(wrenches).T, b_eq=-load)
             assert found.status in (0, 3)
-            ends.append(sign * found.fun if found.status == 0 else -sign * np.inf)
+            ends.append(-sign * np.inf if found.fun is None else sign * found.fun)
         limits.append(np.array(ends))
     return limits[0], limits[1]
 
@@ -282,7 +283,7 @@ def test_frame_shared_by_two_formations_has_the_limits_of_the_earlier(
     it = cases[name]
     segments = it.frames.segments
     different = 0
-    for before, after in zip(segments[:-1], segments[1:], strict=True):
+    for before, after in pairwise(segments):
         if before.contacts != after.contacts:
             index = before.last_frame
             given = np.concatenate([limits[index] for limits in _limits(it.frames)])

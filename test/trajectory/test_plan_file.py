@@ -395,12 +395,17 @@ def test_file_that_is_not_a_plan_is_refused(
 
 
 def test_file_that_does_not_exist_is_named(tmp_path: Path) -> None:
-    with pytest.raises(
-        InvalidPlanError, match=r'none\.json.*No such file.*expected a file to read'
-    ):
+    with pytest.raises(InvalidPlanError, match=r'none\.json: no such file or directory$'):
         read_plan(tmp_path / 'none.json')
 
 
+def test_everything_missing_is_named_once(tmp_path: Path) -> None:
+    (tmp_path / 'plan.json').write_text('{}', encoding='utf-8')
+    with pytest.raises(InvalidPlanError) as caught:
+        read_plan(tmp_path / 'plan.json')
+    assert len(str(caught.value).splitlines()) == 1
+
+
 def test_directory_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidPlanError, match='expected a file to read'):
+    with pytest.raises(InvalidPlanError, match='is a directory'):
         read_plan(tmp_path)

@@ -32,6 +32,7 @@ CONTACTS = 'contacts'
 OBJECT_LAYER = 2
 HAND_LAYER = 3
 CONTACT_LAYER = 5
+_LEGEND_COLUMNS = 6
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -153,6 +154,27 @@ def draw_contacts(
     return tuple(drawn)
 
 
+def header_width(problem: Problem, view: View, panel: float) -> float:
+    """Width that `figure_header` needs, inches.
+
+    Args:
+        problem: Whose bodies.
+        view: What the axes show.
+        panel: Width of the axes, inches.
+    """
+    em = FONT_SIZE / 72.0
+    names = text_widths([name for name, _ in _legend_entries(problem)])
+    columns = [width * FONT_SIZE / SMALL_FONT_SIZE + 4.2 * em for width in names]
+    bar = panel * scale_length(view) / view.width
+    return sum(sorted(columns)[-_LEGEND_COLUMNS:]) + max(text_widths(['0000 mm'])) + bar + 0.2
+
+
+def _legend_entries(problem: Problem) -> list[tuple[str, str]]:
+    """Names and colours of the palm, the fingers and the object."""
+    palm = [('palm', PALM)] if problem.hand.palm else []
+    return [*palm, *finger_colours(problem.hand).items(), ('object', OBJECT)]
+
+
 def figure_header(figure: Figure, problem: Problem, axes: Axes, view: View) -> None:
     """Say in one row at the top which colour is which body, and how long a length of the view is.
 
@@ -164,9 +186,7 @@ def figure_header(figure: Figure, problem: Problem, axes: Axes, view: View) -> N
     """
     across, up = figure.get_size_inches()
     top = up - 0.08
-    entries = [('palm', PALM)] if problem.hand.palm else []
-    entries += list(finger_colours(problem.hand).items())
-    entries.append(('object', OBJECT))
+    entries = _legend_entries(problem)
     figure.legend(
         handles=[
             Patch(facecolor=colour, edgecolor=INK, linewidth=0.6, label=name)
@@ -174,7 +194,7 @@ def figure_header(figure: Figure, problem: Problem, axes: Axes, view: View) -> N
         ],
         loc='upper left',
         bbox_to_anchor=(0.1 / across, top / up),
-        ncols=min(len(entries), 6),
+        ncols=min(len(entries), _LEGEND_COLUMNS),
         frameon=False,
         fontsize=FONT_SIZE,
         handlelength=1.4,

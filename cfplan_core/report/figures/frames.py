@@ -13,6 +13,7 @@ from cfplan_core.report.figures.drawing import (
     draw_bodies,
     draw_contacts,
     figure_header,
+    header_width,
     new_figure,
     world_axes,
 )
@@ -29,6 +30,7 @@ from cfplan_core.trajectory.plan_result import PlanResult
 _PAGE = 7.2
 _COLUMNS = 4
 _CAPTION = 0.23
+_NOTE = 0.2
 
 
 def frames_figure(problem: Problem, result: PlanResult) -> Figure:
@@ -51,8 +53,16 @@ def frames_figure(problem: Problem, result: PlanResult) -> Figure:
     rows = ceil(len(frames) / columns)
     width = (_PAGE - 0.1) / _COLUMNS - 0.1
     height = width * view.height / view.width
-    figure = new_figure(0.1 + max(columns, 2) * (width + 0.1), rows * (height + _CAPTION) + 0.32)
-    page_height = figure.get_size_inches()[1]
+    across = max(0.1 + columns * (width + 0.1), header_width(problem, view, width) + 0.2)
+    page_height = rows * (height + _CAPTION) + 0.32 + _NOTE
+    figure = new_figure(across, page_height)
+    figure.text(
+        0.1 / across,
+        0.07 / page_height,
+        'bold: a segment begins or ends',
+        fontsize=SMALL_FONT_SIZE,
+        color=MUTED,
+    )
     for k, frame in enumerate(frames):
         row, column = divmod(k, columns)
         top = page_height - 0.3 - row * (height + _CAPTION)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.path import Path
 
 from cfplan_core.contact.elements import parse_contact
 from cfplan_core.geometry.polygon import FloatArray, centroid
@@ -17,6 +18,7 @@ from cfplan_core.report.figures.drawing import (
     draw_bodies,
     draw_contacts,
     figure_header,
+    header_width,
     new_figure,
     text_widths,
     world_axes,
@@ -51,6 +53,9 @@ def grasps_figure(problem: Problem, result: PlanResult) -> Figure:
     rows = max(len(contacts) for _, _, contacts in panels)
     columns = [_column_widths(contacts) for _, _, contacts in panels]
     panel = max(_PANEL, *(sum(widths) + 0.2 * len(widths) for widths in columns))
+    if len(panels) == 1:
+        # The scale bar in the header grows with the panel, by at most a fifth of it.
+        panel = max(panel, (header_width(problem, view, panel) - 0.2 * panel) / 0.8)
     scene = panel * view.height / view.width
     table = _ROW * (rows + 1) + 0.1 if rows else 0.0
     width = 0.2 + len(panels) * (panel + _GAP) - _GAP
@@ -103,6 +108,9 @@ def _draw_grasp(
             *(point_boxes(axes, along(outline, spacing), 1.2) for outline in outlines),
         ]
     )
+    hand = np.vstack(
+        [point_boxes(axes, inside(outline, 4.0 * spacing), 3.0) for outline in outlines[1:]]
+    )
     letters = [
         Label(
             letter(k).lower(),
@@ -130,6 +138,7 @@ def _draw_grasp(
             vertex,
             inward_direction(vertices, k),
             {'fontsize': SMALL_FONT_SIZE, 'color': INK, 'zorder': CONTACT_LAYER + 2},
+            avoid=hand,
         )
         for k, vertex in enumerate(vertices)
     ]
@@ -145,6 +154,15 @@ def along(vertices: FloatArray, spacing: float) -> FloatArray:
             for start, edge in zip(vertices, edges, strict=True)
         ]
     )
+
+
+def inside(vertices: FloatArray, spacing: float) -> FloatArray:
+    """Points of a square grid that lie in a polygon, shape (p, 2), m."""
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    counts = np.ceil((high - low) / spacing).astype(int) + 1
+    across, up = (np.linspace(a, b, n) for a, b, n in zip(low, high, counts, strict=True))
+    grid = np.stack(np.meshgrid(across, up), axis=-1).reshape(-1, 2)
+    return np.asarray(grid[Path(vertices).contains_points(grid)])
 
 
 def inward_direction(vertices: FloatArray, k: int) -> FloatArray:

@@ -32,6 +32,7 @@ class Label:
         direction: Shape (2,), where the text should lie as seen from the point, on paper.
         style: Passed to matplotlib.
         distance: From the point to the middle of the text at first, points (1/72 inch).
+        avoid: Shape (k, 4), boxes that this label keeps free too, as from `point_boxes`.
     """
 
     text: str
@@ -39,6 +40,7 @@ class Label:
     direction: FloatArray
     style: dict[str, Any] = field(default_factory=dict)
     distance: float = 9.0
+    avoid: FloatArray = field(default_factory=lambda: np.empty((0, 4)))
 
 
 def letter(k: int) -> str:
@@ -108,7 +110,8 @@ def place_labels(axes: Axes, labels: Sequence[Label], taken: FloatArray) -> tupl
         for offset, reach in _offsets(label.direction, label.distance * pixels, half):
             box = np.concatenate([anchor + offset - half, anchor + offset + half])
             outside = 4.0 * half[0] * half[1] - _overlaps(box, frame)[0]
-            cost = _overlaps(box, occupied).sum() + _CUT * outside
+            covered = _overlaps(box, occupied).sum() + _overlaps(box, label.avoid).sum()
+            cost = covered + _CUT * outside
             if cost < best_cost - 1e-6:
                 best_cost, best_offset, best_reach = cost, offset, reach
             if best_cost < 1e-6:

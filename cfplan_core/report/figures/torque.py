@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +13,7 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Problem
 from cfplan_core.report.figures.timeline import timeline, write_if_it_fits
 from cfplan_core.report.style import INK, MUTED, SMALL_FONT_SIZE, joint_colours
-from cfplan_core.trajectory.plan_result import PlanResult
+from cfplan_core.trajectory.plan_result import PlanResult, Segment
 
 LOWER, UPPER, UNBOUNDED = 'lower limit', 'upper limit', 'unbounded'
 _TYPICAL = 85.0
@@ -24,7 +24,7 @@ def torque_figure(problem: Problem, result: PlanResult) -> Figure:
     """A panel per joint: the band between its limits, hatched where a side is unbounded.
 
     A limit tends to infinity where form closure begins; the panels show typical values and let
-    such limits leave them.
+    such limits leave them. Limits jump where a segment ends.
 
     Args:
         problem: For colours.
@@ -37,17 +37,16 @@ def torque_figure(problem: Problem, result: PlanResult) -> Figure:
         low, high = torque_view(lower, upper)
         axes.set_ylim(low, high)
         axes.axhline(0.0, color=MUTED, linewidth=0.6, zorder=1.5)
-        _draw_band(axes, result.times, lower, upper, colours[name])
-        for values, label in ((lower, LOWER), (upper, UPPER)):
-            for run in finite_runs(values):
-                axes.plot(
-                    result.times[run],
-                    values[run],
-                    color=colours[name],
-                    linewidth=1.5,
-                    marker='.' if run.stop - run.start == 1 else '',
-                    gid=label,
-                )
+        at = np.repeat(result.times, 2)[1:-1]
+        lows, highs = (interval_limits(values, result.segments) for values in (lower, upper))
+        _draw_band(axes, at, lows, highs, colours[name])
+        for values, held, label in ((lower, lows, LOWER), (upper, highs, UPPER)):
+            for run in finite_runs(held):
+                axes.plot(at[run], held[run], color=colours[name], linewidth=1.5, gid=label)
+            alone = np.isfinite(values) & ~np.isin(result.times, at[np.isfinite(held)])
+            if alone.any():
+                points = result.times[alone], values[alone]
+                axes.plot(*points, '.', color=colours[name], gid=label)
         axes.set_ylabel(f'{name}\ntorque (N·m)', fontsize=SMALL_FONT_SIZE, color=INK)
     figure.align_ylabels(panels)
     return figure
@@ -72,6 +71,31 @@ def torque_view(lower: FloatArray, upper: FloatArray) -> tuple[float, float]:
     return low - pad, high + pad
 
 
+def interval_limits(values: FloatArray, segments: Sequence[Segment]) -> FloatArray:
+    """Limits just after and just before the frames, as each segment has them.
+
+    A frame that two segments share carries the limit of the earlier one. The later one starts
+    with the limit of its first own frame, so that limits jump at the shared frame. Where a limit
+    becomes infinite on the way to the next frame, the finite one is held, in form closure the
+    infinite one.
+
+    Args:
+        values: Shape (f,), N·m, may be infinite: a limit at every frame.
+        segments: Of the plan; they cover all frames.
+
+    Returns:
+        Shape (2 (f - 1),), N·m: for every step between frames the limit at its start and its end.
+    """
+    ends = np.repeat(values, 2)[1:-1]
+    for k, segment in enumerate(segments):
+        part = ends[2 * segment.first_frame : 2 * segment.last_frame].reshape(-1, 2)
+        if k and len(part):
+            part[0, 0] = part[0, 1]
+        holds = np.isinf(part) if segment.stability == 'form_closure' else np.isfinite(part)
+        part[:] = np.where(holds.any(axis=1, keepdims=True) & ~holds, part[:, ::-1], part)
+    return ends
+
+
 def finite_runs(values: FloatArray) -> Iterator[slice]:
     """Longest stretches of successive finite values."""
     yield from _runs(np.isfinite(values))
@@ -85,16 +109,14 @@ def _runs(mask: NDArray[np.bool_]) -> Iterator[slice]:
 
 
 def _draw_band(
-    axes: Axes, times: FloatArray, lower: FloatArray, upper: FloatArray, colour: str
+    axes: Axes, at: FloatArray, lower: FloatArray, upper: FloatArray, colour: str
 ) -> None:
-    """Fill the band; a step with an infinite end on a side counts as unbounded on that side."""
+    """Fill between limits as from `interval_limits`, out of the panel where one is infinite."""
     low, high = axes.get_ylim()
     beyond = 0.2 * (high - low)
-    open_below = ~(np.isfinite(lower[:-1]) & np.isfinite(lower[1:]))
-    open_above = ~(np.isfinite(upper[:-1]) & np.isfinite(upper[1:]))
-    at = np.repeat(times, 2)[1:-1]
-    bottom = np.where(np.repeat(open_below, 2), low - beyond, np.repeat(lower, 2)[1:-1])
-    top = np.where(np.repeat(open_above, 2), high + beyond, np.repeat(upper, 2)[1:-1])
+    open_below, open_above = (~np.isfinite(limits[::2]) for limits in (lower, upper))
+    bottom = np.where(np.isfinite(lower), lower, low - beyond)
+    top = np.where(np.isfinite(upper), upper, high + beyond)
     axes.fill_between(at, bottom, top, facecolor=colour, alpha=0.25, linewidth=0.0)
     for run in _runs(open_below | open_above):
         part = slice(2 * run.start, 2 * run.stop)
@@ -111,7 +133,8 @@ def _draw_band(
         )
     for sides, height, direction in ((open_above, 1.0, 1.0), (open_below, 0.0, -1.0)):
         for run in _runs(sides):
-            _mark_unbounded(axes, times[run.start], times[run.stop], height, direction)
+            start, end = at[2 * run.start], at[2 * run.stop - 1]
+            _mark_unbounded(axes, start, end, height, direction)
 
 
 def _mark_unbounded(axes: Axes, start: float, end: float, edge: float, direction: float) -> None:
