@@ -205,8 +205,9 @@ def _first_graze(
 ) -> int:
     """First interval beside a sample whose gap is smallest and, interpolated, may be negative."""
     before, middle, after = gap[:-2], gap[1:-1], gap[2:]
-    dips = (middle > 0.0) & (before > middle + _NEAR) & (after > middle + _NEAR)
-    bend = np.where(dips, before - 2.0 * middle + after, 1.0)
+    bend = before - 2.0 * middle + after
+    dips = (middle > 0.0) & (before >= middle) & (after >= middle) & (bend > _NEAR)
+    bend = np.where(dips, bend, 1.0)
     lowest = middle - 0.125 * (after - before) ** 2 / bend
     inner = offset[1:-1]
     inside = (inner > -_OFFSET_SLACK) & (inner < system.pair_length + _OFFSET_SLACK)

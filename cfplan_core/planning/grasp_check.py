@@ -205,7 +205,7 @@ def _efforts(
         return []
     lower, upper = ((limit + weight)[0] * unit for limit in model.torque_limits(gradients))
     needed = ', '.join(
-        f'{joint.name} from {low:.3g} to {high:.3g} N m'
+        f'{joint.name} from {low:.3g} to {high:.3g} N·m'
         for joint, low, high in zip(system.problem.hand.joints, lower, upper, strict=True)
     )
     return [
@@ -213,7 +213,7 @@ def _efforts(
             file,
             field,
             f'a grasp that takes torques of {needed}',
-            f'torques within the effort limits {", ".join(f"{e:g}" for e in effort)} N m',
+            f'torques within the effort limits {", ".join(f"{e:g}" for e in effort)} N·m',
         )
     ]
 

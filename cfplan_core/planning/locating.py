@@ -47,7 +47,7 @@ def locate(
         Configuration, shape (3 + n,), or None if the event does not happen between the two.
     """
     z = _find(chart, candidate, before, after, direction)
-    if z is None and candidate.kind in (EventKind.EDGE_END, EventKind.JOINT_LIMIT):
+    if z is None and _passed(chart.system, candidate, after):
         # It has happened behind, so it must have before.
         return before
     if z is not None and candidate.kind in (EventKind.CONTACT, EventKind.LINKS_MEET):
@@ -57,6 +57,18 @@ def locate(
         if not -_NEAR <= offset <= float(system.pair_length[candidate.index]) + _NEAR:
             return None
     return z
+
+
+def _passed(system: ContactSystem, candidate: Candidate, z: FloatArray) -> bool:
+    """Tell whether a configuration is beyond the end of an edge or the limit of a joint."""
+    if candidate.kind is EventKind.EDGE_END:
+        sign = 1.0 if candidate.target > 0.0 else -1.0
+    elif candidate.kind is EventKind.JOINT_LIMIT:
+        sign = 1.0 if candidate.target == system.upper[candidate.index] else -1.0
+    else:
+        return False
+    value = _event(system, candidate, z[None], system.place(z[None]))[0]
+    return bool(sign * value[0] > _NEAR)
 
 
 def _find(

@@ -15,7 +15,7 @@ import numpy as np
 
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.gaps import gap_gradients, gaps
-from cfplan_core.contact.system import ContactSystem, IntArray
+from cfplan_core.contact.system import ContactSystem, IntArray, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Margins, Stability
 from cfplan_core.planning.bracketing import enclose
@@ -201,8 +201,14 @@ class _Pursuit:
         """Take the samples up to the first event; return the finished trace if there is one."""
         placed = self.system.place(samples)
         gradients = gap_gradients(self.system, placed, self.contacts)
-        if self.fresh and self.departing and self._penetrates(samples[1:2]):
-            return self._finish(EventKind.CONTACT, tuple(sorted(self.departing)))
+        if self.fresh:
+            for kind, pairs in (
+                (EventKind.CONTACT, sorted(self.departing)),
+                (EventKind.LINKS_MEET, self._meeting_links(placed)),
+            ):
+                overlapping = self._overlapping(samples[1:2], pairs)
+                if overlapping:
+                    return self._finish(kind, overlapping)
         sighting = sight(self.system, self.formation, samples, placed)
         samples, stable = self._watch(samples, self.model.margins(gradients), sighting.interval)
         lost = int(np.argmax(stable[1:] <= 0.0)) if (stable[1:] <= 0.0).any() else len(stable)
@@ -263,11 +269,23 @@ class _Pursuit:
         basis = tangent_basis(np.concatenate([gradients, self.held]))
         return Chart(self.system, self.rows, z, basis, self.held)
 
-    def _penetrates(self, z: FloatArray) -> bool:
-        pairs = np.array(sorted(self.departing), dtype=np.intp)
-        gap, offset = gaps(self.system, self.system.place(z), pairs)
-        within = (offset >= 0.0) & (offset <= self.system.pair_length[pairs])
-        return bool((within & (gap < -1e-12)).any())
+    def _overlapping(self, z: FloatArray, pairs: list[int]) -> tuple[int, ...]:
+        """Those of some pairs, which touch at the start, that overlap just behind it."""
+        if not pairs:
+            return ()
+        chosen = np.array(pairs, dtype=np.intp)
+        gap, offset = gaps(self.system, self.system.place(z), chosen)
+        within = (offset >= 0.0) & (offset <= self.system.pair_length[chosen])
+        return tuple(int(pair) for pair in chosen[(within & (gap < -1e-12))[0]])
+
+    def _meeting_links(self, placed: Placement) -> list[int]:
+        """Pairs of links that touch at the start."""
+        first = self.system.contact_count
+        start = Placement(*(feature[:1] for feature in placed))
+        gap, offset = gaps(self.system, start, slice(first, None))
+        length = self.system.pair_length[first:]
+        touching = (np.abs(gap[0]) < 1e-8) & (offset[0] > -1e-8) & (offset[0] < length + 1e-8)
+        return [first + int(k) for k in np.flatnonzero(touching)]
 
     def _end(
         self,
