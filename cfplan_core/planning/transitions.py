@@ -8,7 +8,7 @@ lie at one place (a vertex on a vertex), if the kept one moves into its edge.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -20,7 +20,7 @@ from cfplan_core.contact.gaps import gap_gradients, gaps, offset_gradients
 from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel
-from cfplan_core.planning.manifold import RANK_TOLERANCE
+from cfplan_core.planning.manifold import RANK_TOLERANCE, independent_rows
 from cfplan_core.planning.tracing import STABILITY_MARGIN
 
 # Contacts are located to 1e-11: what is nearer than this touches.
@@ -104,11 +104,9 @@ def departures(
     Returns:
         In the order of their contacts.
     """
-    found = []
-    for kept, basis in _stable_formations(around, model, failures, 1, 1):
-        for tangent in (basis[0], -basis[0]):
-            found += _departure(around, kept, tangent, failures)
-    return found
+    dof = around.gradients.shape[1]
+    directions = [t for basis in _tangents(around, dof - 1) for t in (basis[0], -basis[0])]
+    return _distinct(_leave(around, model, t, 1, failures) for t in directions)
 
 
 def crossings(
@@ -122,57 +120,79 @@ def crossings(
         heading: Unit vector, shape (3 + n,); each formation is entered along its projection.
         failures: Counts why others are not entered.
     """
+    dof = len(heading)
     found = []
-    for kept, basis in _stable_formations(around, model, failures, 2, len(heading)):
-        ahead = basis.T @ (basis @ heading)
-        length = float(np.linalg.norm(ahead))
-        if length > _OBLIQUE:
-            found += _departure(around, kept, ahead / length, failures)
-    return found
+    for size in range(3, dof - 1):
+        for basis in _tangents(around, size):
+            ahead = basis.T @ (basis @ heading)
+            length = float(np.linalg.norm(ahead))
+            if length > _OBLIQUE:
+                found.append(_leave(around, model, ahead / length, dof - size, failures))
+    return _distinct(found)
 
 
-def _stable_formations(
-    around: Surroundings, model: ContactModel, failures: Counter[str], least: int, most: int
-) -> Iterator[tuple[list[int], FloatArray]]:
-    """Stable subsets of the touching contacts of some dimensions, with tangent bases."""
+def _distinct(found: Iterable[Departure | None]) -> list[Departure]:
+    """Departures that differ, ordered by their contacts, then as they were found."""
+    kept: list[Departure] = []
+    for way in found:
+        if way is not None and not any(
+            way.formation == other.formation
+            and np.abs(way.direction - other.direction).max() < _STILL
+            for other in kept
+        ):
+            kept.append(way)
+    return sorted(kept, key=lambda way: way.formation)
+
+
+def _tangents(around: Surroundings, size: int) -> list[FloatArray]:
+    """Tangent bases of all independent choices of so many touching contacts; distinct if lines."""
     count, dof = around.gradients.shape
-    for size in range(3, count + 1):
-        subsets = np.array(list(combinations(range(count), size)), dtype=np.intp)
-        if dof - size > most:
-            continue
-        gradients = around.gradients[subsets]
-        _, singular, right = np.linalg.svd(gradients)
-        dimension = dof - (singular > RANK_TOLERANCE).sum(axis=1)
-        fits = (dimension >= least) & (dimension <= most)
-        stable = np.asarray(model.margins(gradients).stable > STABILITY_MARGIN)
-        failures['unstable contact formation'] += int((fits & ~stable).sum())
-        for k in np.flatnonzero(fits & stable):
-            yield [int(i) for i in subsets[k]], right[k, dof - dimension[k] :]
+    if count < size:
+        return []
+    subsets = np.array(list(combinations(range(count), size)), dtype=np.intp)
+    _, singular, right = np.linalg.svd(around.gradients[subsets])
+    bases = right[singular[:, -1] > RANK_TOLERANCE][:, size:]
+    if dof - size > 1 or not len(bases):
+        return list(bases)
+    largest = np.abs(bases[:, 0]).argmax(axis=1)
+    sign = np.sign(bases[np.arange(len(bases)), 0, largest])
+    _, first = np.unique(np.round(bases[:, 0] * sign[:, None], 6), axis=0, return_index=True)
+    return [bases[k] for k in np.sort(first)]
 
 
-def _departure(
-    around: Surroundings, kept: list[int], direction: FloatArray, failures: Counter[str]
-) -> list[Departure]:
-    """Return the departure along a direction of a formation, in a list, if it is possible."""
+def _leave(
+    around: Surroundings,
+    model: ContactModel,
+    direction: FloatArray,
+    dimension: int,
+    failures: Counter[str],
+) -> Departure | None:
+    """Return the departure along a direction, if there is one.
+
+    The direction decides which contacts are kept: those whose gap stays as it is and whose vertex
+    does not slide off the end of its edge.
+    """
+    rates = around.gradients @ direction
     inward = around.inward @ direction
-    if any(around.at_end[i] and abs(inward[i]) < _STILL for i in kept):
+    still = np.abs(rates) < _STILL
+    if (still & around.at_end & (np.abs(inward) < _STILL)).any():
         failures['a vertex would be held on a vertex'] += 1
-        return []
-    if any(inward[i] < 0.0 for i in kept):
-        failures['a contact would leave its edge'] += 1
-        return []
-    opening = [
-        i for i in range(len(around.pairs)) if i not in kept and not around.together[i, kept].any()
-    ]
-    rates = around.gradients[opening] @ direction
-    if any(rate < -_STILL for rate in rates):
+        return None
+    kept = still & (inward >= 0.0)
+    beside = around.together[:, kept].any(axis=1)
+    if (~kept & ~beside & (rates < -_STILL)).any():
         failures['a contact would penetrate'] += 1
-        return []
-    # A gap that stays as it is closes nothing where the vertex slides off the end of the edge.
-    if any(rate < _STILL and inward[i] > -_STILL for i, rate in zip(opening, rates, strict=True)):
-        failures['a contact would stay'] += 1
-        return []
-    leaving = frozenset(
-        int(around.pairs[i]) for i, rate in zip(opening, rates, strict=True) if rate >= _STILL
+        return None
+    gradients = around.gradients[kept]
+    if len(direction) - len(independent_rows(gradients)) != dimension:
+        failures['a contact would leave its edge'] += 1
+        return None
+    if not model.margins(gradients[None]).stable[0] > STABILITY_MARGIN:
+        failures['unstable contact formation'] += 1
+        return None
+    opening = ~kept & ~beside & (rates > _STILL)
+    return Departure(
+        Formation(tuple(int(pair) for pair in around.pairs[kept])),
+        direction,
+        frozenset(int(pair) for pair in around.pairs[opening]),
     )
-    return [Departure(Formation(tuple(int(i) for i in around.pairs[kept])), direction, leaving)]
