@@ -23,6 +23,8 @@ CONVERGED = 1e-7
 _ITERATIONS = 8
 # A step this long has lost the manifold.
 _ASTRAY = 10.0
+# Gaps below this are closed.
+_TOUCHING = 1e-10
 
 
 class Projected(NamedTuple):
@@ -164,13 +166,28 @@ def settle(system: ContactSystem, z: FloatArray, pairs: IntArray) -> FloatArray:
         pairs: Contacts, dependent or not, shape (k,).
 
     Returns:
-        Shape (3 + n,), by Gauss-Newton steps of least norm.
+        Shape (3 + n,), by Gauss-Newton steps of least norm. Joints that these would take beyond a
+        limit stay at it where the contacts allow.
     """
+    settled = _settle(system, z, pairs, np.ones(system.dof, dtype=bool))
+    clipped = settled.copy()
+    clipped[3:] = np.clip(settled[3:], system.lower, system.upper)
+    free = clipped == settled
+    if free.all():
+        return settled
+    held = _settle(system, clipped, pairs, free)
+    off = np.abs(gaps(system, system.place(held[None]), pairs).gap).max()
+    return held if off < _TOUCHING else settled
+
+
+def _settle(system: ContactSystem, z: FloatArray, pairs: IntArray, free: BoolArray) -> FloatArray:
+    """Gauss-Newton steps of least norm in the free coordinates."""
+    z = z.copy()
     for _ in range(_ITERATIONS):
         placed = system.place(z[None])
-        gradients = gap_gradients(system, placed, pairs)[0]
+        gradients = gap_gradients(system, placed, pairs)[0][:, free]
         step = np.linalg.lstsq(gradients, gaps(system, placed, pairs).gap[0], rcond=1e-9)[0]
-        z = z - step
+        z[free] -= step
         if np.abs(step).max() < 1e-14:
             break
     return z

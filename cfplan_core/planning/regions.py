@@ -51,9 +51,7 @@ class Regions:
 
     def around(self, formation: Formation, z: FloatArray) -> Region:
         """Return the region of a formation that a stable configuration lies inside."""
-        region = self._merge(formation, z, z[None])
-        assert region is not None, 'a configuration inside a region is no entry to be dropped'
-        return region
+        return self._find(formation, z, z[None]) or self._make(formation, z, z[None])
 
     def beside(self, piece: Piece) -> list[tuple[FloatArray, Piece]]:
         """Regions that a piece borders on: those where one of its contacts opens."""
@@ -135,31 +133,43 @@ class Regions:
         return self._merge(way.formation, z, points[: len(points) // 2 + 1])
 
     def _merge(self, formation: Formation, z: FloatArray, inward: FloatArray) -> Region | None:
-        """Find or make the region that points from z lead into."""
-        roadmap = self._roadmap
-        anchor = inward[-1]
-        stability = classify(roadmap.tracer.margins(formation, anchor[None]))
-        known = self._known.setdefault((formation, stability), [])
-        for region in known:
-            joining = self._straight(formation, anchor, region.anchor)
+        """Find or make the region that points from z lead into; None if there are too many."""
+        region = self._find(formation, z, inward)
+        if region is None and len(self._like(formation, inward[-1])) >= _MOST_REGIONS:
+            self._roadmap.failures['too many regions of one formation'] += 1
+            return None
+        return region or self._make(formation, z, inward)
+
+    def _like(self, formation: Formation, z: FloatArray) -> list[Region]:
+        """Known regions of a formation in the stability class of a configuration."""
+        stability = classify(self._roadmap.tracer.margins(formation, z[None]))
+        return self._known.setdefault((formation, stability), [])
+
+    def _find(self, formation: Formation, z: FloatArray, inward: FloatArray) -> Region | None:
+        """Find the known region that points from z lead into, and link z to it."""
+        for region in self._like(formation, inward[-1]):
+            joining = self._straight(formation, inward[-1], region.anchor)
             if joining is not None:
                 region.links.append((z, np.concatenate([joining[::-1], inward[-2::-1]])))
                 return region
-        if len(known) >= _MOST_REGIONS:
-            roadmap.failures['too many regions of one formation'] += 1
-            return None
+        return None
+
+    def _make(self, formation: Formation, z: FloatArray, inward: FloatArray) -> Region:
+        """Make the region that points from z lead into; the last of them is its anchor."""
+        roadmap = self._roadmap
+        anchor = inward[-1]
         gradients = roadmap.tracer.gradients(anchor[None], formation.array)[0]
         region = Region(
             len(roadmap.pieces),
             formation,
-            stability,
+            classify(roadmap.tracer.margins(formation, anchor[None])),
             roadmap.system.dof - len(independent_rows(gradients)),
             anchor[None],
             (),
             [(z, inward[::-1])],
         )
         roadmap.pieces.append(region)
-        known.append(region)
+        self._like(formation, anchor).append(region)
         return region
 
     def _straight(

@@ -14,6 +14,8 @@ from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
 _INNER = np.arange(1, 8) / 8.0
 # Width, as a part of the interval between two points, to which a change of class is located.
 _WIDTH = 1e-6
+# Length, in radians and object sizes, below which a part is not told apart.
+_HAIR = 1e-4
 
 
 def split_by_class(
@@ -39,7 +41,24 @@ def split_by_class(
         parts.append((_name(closed[change]), [*begin, *points[first : change + 1], edge]))
         begin, first = [edge], int(change) + 1
     parts.append((_name(closed[-1]), [*begin, *points[first:]]))
-    return [(stability, np.array(part)) for stability, part in parts]
+    return _without_hairs([(stability, np.array(part)) for stability, part in parts])
+
+
+def _without_hairs(
+    parts: list[tuple[Stability, FloatArray]],
+) -> list[tuple[Stability, FloatArray]]:
+    """Give parts that are hardly longer than a point to the longer one of their neighbours."""
+    while len(parts) > 1:
+        extents = [float(np.abs(part - part[0]).max()) for _, part in parts]
+        hair = int(np.argmin(extents))
+        if extents[hair] >= _HAIR:
+            break
+        low, high = max(hair - 1, 0), min(hair + 2, len(parts))
+        beside = [k for k in range(low, high) if k != hair]
+        stability = parts[max(beside, key=lambda k: extents[k])][0]
+        joined = [parts[low][1], *(part[1:] for _, part in parts[low + 1 : high])]
+        parts = [*parts[:low], (stability, np.concatenate(joined)), *parts[high:]]
+    return parts
 
 
 def _name(closed: bool) -> Stability:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.gaps import gap_gradients, gaps
+from cfplan_core.contact.gaps import gap_gradients, gaps, wedge_lifts
 from cfplan_core.contact.system import ContactSystem, IntArray, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Margins, Stability
@@ -209,6 +209,10 @@ class _Pursuit:
                 overlapping = self._overlapping(samples[1:2], pairs)
                 if overlapping:
                     return self._finish(kind, overlapping)
+            just_behind = self.system.place(samples[1:2])
+            if np.min(wedge_lifts(self.system, just_behind, self.contacts)) < -1e-9:
+                # An edge that lay flush would dip into the edge that its vertex touches.
+                return self._finish(EventKind.CONTACT, self.formation.pairs)
         sighting = sight(self.system, self.formation, samples, placed)
         samples, stable = self._watch(samples, self.model.margins(gradients), sighting.interval)
         lost = int(np.argmax(stable[1:] <= 0.0)) if (stable[1:] <= 0.0).any() else len(stable)

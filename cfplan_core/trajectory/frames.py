@@ -24,6 +24,8 @@ _LARGEST_TURN = 0.048
 _LARGEST_SHIFT = 0.024
 # Frames inside a segment nearer than this are left out.
 _SMALLEST = 0.01
+# Steps of a curve are at most a few times too large.
+_HALVINGS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,12 +113,13 @@ def _evenly(system: ContactSystem, leg: Leg) -> FloatArray:
     if len(leg.points) > 1:
         kept.append(leg.points[-1])
     points = np.array(kept)
-    while True:
+    for _ in range(_HALVINGS):
         large = np.flatnonzero(_steps(system, points) > 1.0)
         if not len(large):
-            return points
+            break
         middles = _middles(system, leg, points[large], points[large + 1])
         points = np.insert(points, large + 1, middles, axis=0)
+    return points
 
 
 def _parts(tracer: Tracer, leg: Leg, z: FloatArray) -> list[tuple[Stability, FloatArray]]:
