@@ -36,8 +36,8 @@ def gaps(system: ContactSystem, placed: Placement, pairs: IntArray | slice) -> G
         pairs: Which pairs: indices of shape (m,), or a slice.
     """
     vertices, edge = placed.vertices, system.pair_edge[pairs]
-    apart = vertices[:, system.pair_vertex[pairs]] - vertices[:, edge]
-    local = placed.normals[:, edge].conj() * apart
+    apart = vertices.take(system.pair_vertex[pairs], axis=1) - vertices.take(edge, axis=1)
+    local = placed.normals.take(edge, axis=1).conj() * apart
     return Gaps(local.real, local.imag)
 
 
@@ -47,7 +47,7 @@ def gap_gradients(system: ContactSystem, placed: Placement, pairs: IntArray) -> 
     Returns:
         Shape (s, m, 3 + n); for contacts the first three columns are wᵀ, the others jᵀ.
     """
-    return _rates(system, placed, pairs, placed.normals[:, system.pair_edge[pairs]])
+    return _rates(system, placed, pairs, placed.normals.take(system.pair_edge[pairs], axis=1))
 
 
 def offset_gradients(system: ContactSystem, placed: Placement, pairs: IntArray) -> FloatArray:
@@ -90,7 +90,7 @@ def _rates(
     system: ContactSystem, placed: Placement, pairs: IntArray, direction: ComplexArray
 ) -> FloatArray:
     """Gradient of the relative displacement at each pair's vertex along given unit vectors."""
-    point = placed.vertices[:, system.pair_vertex[pairs]]
+    point = placed.vertices.take(system.pair_vertex[pairs], axis=1)
     rows = np.empty((*direction.shape, system.dof))
     sign = system.pair_object_sign[pairs]
     rows[..., 0] = sign * direction.real

@@ -215,13 +215,15 @@ class ContactSystem:
         """World positions of all vertices and normals for configurations z, shape (s, 3 + n)."""
         turns = np.empty((len(z), 2 + self.joint_count), dtype=complex)
         turns[:, 0] = 1.0
-        turns[:, 1] = np.exp(1j * z[:, 2])
-        turns[:, 2:] = np.exp(1j * (z[:, 3:] @ self._accumulate.T + self._base_angle))
-        origins = np.zeros_like(turns)
+        turns[:, 1] = 1j * z[:, 2]
+        turns[:, 2:] = 1j * (z[:, 3:] @ self._accumulate.T + self._base_angle)
+        np.exp(turns[:, 1:], out=turns[:, 1:])
+        origins = np.empty_like(turns)
+        origins[:, 0] = 0.0
         origins[:, 1] = z[:, 0] + 1j * z[:, 1]
         origins[:, 2:] = turns[:, 2:] @ self._reach.T + self._base
-        turn = turns[:, self._frame_of]
-        vertices = origins[:, self._frame_of] + turn * self._local
+        turn = turns.take(self._frame_of, axis=1)
+        vertices = origins.take(self._frame_of, axis=1) + turn * self._local
         return Placement(origins[:, 1], origins[:, 2:], vertices, turn * self._local_normal)
 
     def link_weight_torques(self, z: FloatArray) -> FloatArray:

@@ -178,13 +178,14 @@ def _leave(
     if (still & around.at_end & (np.abs(inward) < _STILL)).any():
         failures['a vertex would be held on a vertex'] += 1
         return None
-    kept = still & (inward >= 0.0)
+    slides = inward < 0.0
+    kept = still & ~slides
     beside = around.together[:, kept].any(axis=1)
     if (~kept & ~beside & (rates < -_STILL)).any():
         failures['a contact would penetrate'] += 1
         return None
     gradients = around.gradients[kept]
-    if len(direction) - len(independent_rows(gradients)) != dimension:
+    if (still & slides).any() and (len(direction) - len(independent_rows(gradients)) != dimension):
         failures['a contact would leave its edge'] += 1
         return None
     if not model.margins(gradients[None]).stable[0] > STABILITY_MARGIN:
