@@ -49,9 +49,5 @@ class InvalidPlanError(CfplanError):
     """A plan file breaks the format ``cfplan/plan/1``."""
 
 
-class NotInContactError(CfplanError):
-    """A configuration does not satisfy its contacts within the stated tolerance."""
-
-
 class JammedError(CfplanError):
     """A joint velocity admits no object velocity that keeps every gap non-negative."""
