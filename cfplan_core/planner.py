@@ -14,6 +14,7 @@ from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Problem
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.grasp_check import examine_problem
+from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.search import Search, Tree
 from cfplan_core.trajectory.frames import Frames, build_frames, overloaded_legs
@@ -134,8 +135,9 @@ class _Planning:
     def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> Frames | None:
         """Search until a path is found that the joints' efforts can hold.
 
-        Efforts are looked at on paths only: pieces that need more than a joint's limit are blocked
-        and the search is run again on the roadmap that is there.
+        Efforts are looked at on paths only: points and curves that need more than a joint's limit
+        are blocked, ways through regions forgotten, and the search is run again on the roadmap
+        that is there.
         """
         blocked: frozenset[int] = frozenset()
         while True:
@@ -146,7 +148,18 @@ class _Planning:
             too_weak = overloaded_legs(self.system, self.model, legs)
             if not too_weak:
                 return build_frames(self.system, self.model, legs)
-            blocked |= {legs[index].piece for index in too_weak}
+            for index in too_weak:
+                leg = legs[index]
+                piece = self.roadmap.pieces[leg.piece]
+                # The first leg begins at the start, the last one ends at the goal.
+                passed = [leg.points[0]] if index > 0 else []
+                if index < len(legs) - 1:
+                    passed.append(leg.points[-1])
+                if isinstance(piece, Region) and passed:
+                    for z in passed:
+                        self.roadmap.regions.drop(piece, z)
+                else:
+                    blocked |= {piece.index}
             self.roadmap.failures['a joint would exceed its effort limit'] += len(too_weak)
 
     def _checkpoint(self) -> None:

@@ -66,6 +66,21 @@ class Regions:
             self._beyond[piece.index] = list(self._shoot(piece))
         return self._beyond[piece.index]
 
+    def drop(self, region: Region, z: FloatArray) -> None:
+        """Forget that a region is entered or left at a configuration, shape (3 + n,)."""
+
+        def apart(other: FloatArray) -> bool:
+            return bool(np.abs(other - z).max() > SAME)
+
+        region.links = [link for link in region.links if apart(link[0])]
+        for table in (self._beyond, self._beside):
+            for index, found in table.items():
+                table[index] = [
+                    (at, piece)
+                    for at, piece in found
+                    if apart(at) or (piece is not region and index != region.index)
+                ]
+
     def reach(self, region: Region, columns: IntArray, wanted: FloatArray) -> Iterator[FloatArray]:
         """Drive some coordinates towards wanted values, shape (m,), inside a region.
 
