@@ -16,15 +16,20 @@ DEMO = runs/demo
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
 
-demo: $(READY) ## plan the 1991 problem, certify the plan, draw the figures and an animation
-	$(BIN)/cfplan plan $(PROBLEM) --json $(DEMO)/plan.json --figures $(DEMO)
+demo: $(READY) ## start the node, call it with the 1991 problem, certify and draw the answer
+	@mkdir -p $(DEMO)
+	@# A domain of its own keeps the demo from meeting other nodes of this machine.
+	@export ROS_DOMAIN_ID=$$(( $$$$ % 100 + 1 )); \
+	$(BIN)/cfplan node $(PROBLEM) --ros-args -p record_directory:=$(DEMO) & node=$$!; \
+	trap 'kill $$node; wait $$node' EXIT; \
+	$(BIN)/cfplan call $(PROBLEM) --wait 30 --json $(DEMO)/plan.json --figures $(DEMO)
 	$(BIN)/cfplan verify $(PROBLEM) $(DEMO)/plan.json
 	$(BIN)/cfplan animate $(DEMO)/plan.json --problem $(PROBLEM) -o $(DEMO)/animation.gif
 	@echo
-	@echo 'The plan is $(DEMO)/plan.json; the pictures are in $(DEMO):'
-	@cd $(DEMO) && ls *.png *.gif
+	@echo 'The plan is $(DEMO)/plan.json; the recorded run and the pictures are in $(DEMO):'
+	@cd $(DEMO) && ls *.mcap *.png *.gif
 
-test: $(READY) ## run the tests
+test: $(READY) ## run the tests of core, standalone runtime and node
 	$(BIN)/python -m pytest
 
 lint: $(READY) ## check style and formatting
@@ -50,7 +55,7 @@ clean: ## remove .venv and everything that was built, cached or drawn by the dem
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The marker is touched last, so that an interrupted installation starts afresh.
-$(READY): constraints.txt setup.py
+$(READY): constraints.txt setup.py standalone/pyproject.toml
 	@test -n "$(PYTHON)" || { \
 	echo 'cfplan needs Python 3.10 or newer; name one with make PYTHON=...' >&2; exit 1; }
 	@echo 'Installing into .venv; the first time this takes a minute.'
@@ -58,5 +63,6 @@ $(READY): constraints.txt setup.py
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check \
 	--constraint constraints.txt setuptools
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-	--constraint constraints.txt --no-build-isolation --editable '.[test,lint]'
+	--constraint constraints.txt --no-build-isolation --editable '.[test,lint]' \
+	--editable ./standalone
 	@touch $@

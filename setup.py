@@ -7,9 +7,9 @@ from setuptools import find_packages, setup
 PACKAGE = 'cfplan_ros'
 
 
-def config_files() -> list[tuple[str, list[str]]]:
-    """List the files below config/, folder by folder, with where they are installed."""
-    folders = sorted({path.parent for path in Path('config').rglob('*') if path.is_file()})
+def files_below(top: str) -> list[tuple[str, list[str]]]:
+    """List the files below a folder, folder by folder, with where they are installed."""
+    folders = sorted({path.parent for path in Path(top).rglob('*') if path.is_file()})
     return [
         (
             f'share/{PACKAGE}/{folder.as_posix()}',
@@ -36,7 +36,8 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
-        *config_files(),
+        *files_below('config'),
+        *files_below('launch'),
     ],
     zip_safe=False,
     python_requires='>=3.10',
@@ -44,6 +45,7 @@ setup(
         'click>=8.1',
         'jsonschema>=4.10',
         'matplotlib>=3.10',
+        'mcap>=1.1',
         'numpy>=1.26',
         'pillow>=10.0',
         'pyyaml>=6.0',
@@ -52,8 +54,25 @@ setup(
         'shapely>=2.0',
     ],
     extras_require={
-        'test': ['hypothesis>=6.100', 'pytest>=7.4', 'pytest-benchmark>=4.0'],
+        'test': [
+            'hypothesis>=6.100',
+            'psutil>=5.9',
+            'pytest>=7.4',
+            'pytest-benchmark>=4.0',
+            'rosbags>=0.10',
+        ],
         'lint': ['mypy>=1.11', 'ruff>=0.6', 'scipy-stubs', 'types-jsonschema', 'types-PyYAML'],
     },
-    entry_points={'console_scripts': ['cfplan = cfplan_core.command_line:main']},
+    entry_points={
+        'console_scripts': [
+            'cfplan = cfplan_core.command_line:main',
+            'planner_node = cfplan_ros.planner_node:main',
+        ],
+        'cfplan.commands': [
+            'bag = cfplan_ros.command_line.bag:bag',
+            'call = cfplan_ros.command_line.call:call',
+            'node = cfplan_ros.command_line.node:node',
+            'recover = cfplan_ros.command_line.recover:recover',
+        ],
+    },
 )

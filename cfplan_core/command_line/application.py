@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 import click
@@ -20,9 +21,32 @@ from cfplan_core.errors import CfplanError, InvalidProblemError
 
 READER_GONE = 141
 
+# Other modules of the installation add commands by entry points of this group.
+COMMANDS = 'cfplan.commands'
+
 
 class Application(click.Group):
-    """A group whose commands return their exit status and may raise what a user can cause."""
+    """A group whose commands return their exit status and may raise what a user can cause.
+
+    Beside its own commands it has those that entry points of the group `COMMANDS` name.
+    """
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Name all commands: its own first, then those of other modules."""
+        own = list(self.commands)
+        return own + sorted(set(_further_commands()) - set(own))
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Look a command up by its name."""
+        own = super().get_command(ctx, cmd_name)
+        if own is not None:
+            return own
+        entry = _further_commands().get(cmd_name)
+        if entry is None:
+            return None
+        command = entry.load()
+        assert isinstance(command, click.Command)
+        return command
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the chosen command and exit with its status."""
@@ -49,6 +73,10 @@ class Application(click.Group):
             complain(_reason(error))
             status = INVALID_INPUT
         ctx.exit(status)
+
+
+def _further_commands() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=COMMANDS)}
 
 
 def _reason(error: OSError) -> str:

@@ -40,9 +40,10 @@ EXIT_STATUS = {
 }
 
 
-def _finite_seconds(
+def finite_seconds(
     ctx: click.Context, param: click.Parameter, value: float | None
 ) -> float | None:
+    """Accept an option's number of seconds if a search or a wait can last that long."""
     if value is not None and not (math.isfinite(value) and value > 0.0):
         raise click.BadParameter(f'{value} is not a finite number of seconds above zero.')
     return value
@@ -67,7 +68,7 @@ def _finite_seconds(
 @click.option(
     '--time-budget',
     type=float,
-    callback=_finite_seconds,
+    callback=finite_seconds,
     metavar='S',
     help='Give up after S seconds.',
 )
@@ -100,7 +101,7 @@ def plan(
     except InvalidProblemError as error:
         print_findings(error.findings, complaints())
         if json_path is not None:
-            _write(_invalid(examined, file, error), json_path)
+            write_result(_invalid(examined, file, error), json_path)
         return INVALID_INPUT
     if interrupted:
         complain('interrupted; nothing is written')
@@ -108,13 +109,13 @@ def plan(
 
     # Files first: they must be there even if the reader of the tables leaves early.
     if json_path is not None:
-        _write(result, json_path)
+        write_result(result, json_path)
     figures: list[Path] = []
     if figure_directory is not None and result.status is not Status.INVALID:
         from cfplan_core.report.figures import write_figures
 
         figures = write_figures(problem, result, figure_directory)
-    _print(problem, result, figures)
+    print_result(problem, result, figures)
     return EXIT_STATUS[result.status]
 
 
@@ -181,13 +182,15 @@ def _invalid(examined: Examined, file: Path, error: InvalidProblemError) -> Plan
     )
 
 
-def _write(result: PlanResult, path: Path) -> None:
+def write_result(result: PlanResult, path: Path) -> None:
+    """Write a result of any status as JSON."""
     from cfplan_core.trajectory.plan_file import write_plan
 
     write_plan(result, path)
 
 
-def _print(problem: Problem, result: PlanResult, figures: list[Path]) -> None:
+def print_result(problem: Problem, result: PlanResult, figures: list[Path]) -> None:
+    """Print a result as tables, and where its figures are."""
     from cfplan_core.report.tables import print_plan
 
     if result.status is Status.INVALID:
