@@ -44,7 +44,7 @@ setup(
     install_requires=[
         'click>=8.1',
         'jsonschema>=4.10',
-        'matplotlib>=3.10',
+        'matplotlib>=3.6',
         'mcap>=1.1',
         'numpy>=1.26',
         'pillow>=10.0',

@@ -88,7 +88,7 @@ def call(
     Exit status: 0 solved, 1 infeasible (searched to the end), 2 invalid input or usage, 3 budget
     exhausted, 4 the planner is not there or could not plan, 130 interrupted.
     """
-    from cfplan_core.model import load_problem
+    from cfplan_core.model.loading import load_problem
 
     problem = load_problem(file)
     for directory in (json_path.parent if json_path else None, figure_directory):

@@ -39,7 +39,7 @@ def node(file: Path | None, ros_arguments: tuple[str, ...]) -> int:
 
 def _scene_of(file: Path) -> list[str]:
     """Arguments that give the node the hand, the object and the gravity of a problem file."""
-    from cfplan_core.model import load_problem
+    from cfplan_core.model.loading import load_problem
 
     gravity = ', '.join(repr(float(value)) for value in load_problem(file).gravity)
     values = {'hand_file': file, 'object_file': file, 'gravity': f'[{gravity}]'}

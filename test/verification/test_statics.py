@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -127,7 +127,9 @@ def test_form_closure_is_found_where_all_triples_say_so(
     assert (closure_margin(held) > 1e-9) == spans
 
 
-@settings(max_examples=40, deadline=None)
+@settings(
+    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.filter_too_much]
+)
 @given(contacts=CONTACTS, arms=st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6))
 def test_torque_limits_are_those_of_the_corners_of_the_force_polytope(
     contacts: list[tuple[float, float, float]], arms: list[float]

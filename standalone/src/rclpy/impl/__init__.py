@@ -1,0 +1,1 @@
+"""Parts of rclpy that code for ROS imports from here."""
