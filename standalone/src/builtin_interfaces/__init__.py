@@ -1,0 +1,1 @@
+"""Interface package builtin_interfaces."""

@@ -1,0 +1,1 @@
+"""Interface package cfplan_msgs."""

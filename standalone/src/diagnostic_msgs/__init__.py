@@ -1,0 +1,1 @@
+"""Interface package diagnostic_msgs."""

@@ -1,0 +1,1 @@
+"""Interface package geometry_msgs."""

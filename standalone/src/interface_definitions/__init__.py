@@ -1,0 +1,1 @@
+"""The files that define messages and services, one folder for each interface package."""

@@ -1,0 +1,1 @@
+"""Interface package rcl_interfaces."""

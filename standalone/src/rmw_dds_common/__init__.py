@@ -1,0 +1,1 @@
+"""Interface package rmw_dds_common."""

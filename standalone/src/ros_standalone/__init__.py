@@ -1,0 +1,1 @@
+"""What the standalone rclpy stands on: message classes and the middleware."""

@@ -1,0 +1,1 @@
+"""Interface package rosgraph_msgs."""

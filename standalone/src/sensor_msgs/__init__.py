@@ -1,0 +1,1 @@
+"""Interface package sensor_msgs."""

@@ -1,0 +1,1 @@
+"""Interface package service_msgs."""

@@ -1,0 +1,1 @@
+"""Interface package std_msgs."""

@@ -1,0 +1,1 @@
+"""Interface package tf2_msgs."""

@@ -1,0 +1,1 @@
+"""Interface package trajectory_msgs."""

@@ -1,0 +1,1 @@
+"""Interface package type_description_interfaces."""

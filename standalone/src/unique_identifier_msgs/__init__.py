@@ -1,0 +1,1 @@
+"""Interface package unique_identifier_msgs."""

@@ -1,0 +1,1 @@
+"""Interface package visualization_msgs."""
