@@ -45,7 +45,7 @@ setup(
         'click>=8.1',
         'jsonschema>=4.10',
         'matplotlib>=3.6',
-        'mcap>=1.1',
+        'mcap>=1.5',
         'numpy>=1.26',
         'pillow>=10.0',
         'pyyaml>=6.0',

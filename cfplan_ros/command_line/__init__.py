@@ -1,0 +1,1 @@
+"""The commands of ``cfplan`` that need ROS: call and start a planner, read and recover runs."""

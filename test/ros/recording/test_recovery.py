@@ -1,0 +1,381 @@
+from __future__ import annotations
+
+import errno
+import fcntl
+import random
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from ros.recording.example import STAMP, example, not_solved, recorder
+
+from cfplan_core.errors import CfplanError
+from cfplan_ros.planning_service import pictures
+from cfplan_ros.recording.intact import NotMcapError
+from cfplan_ros.recording.reading import read_messages, read_run
+from cfplan_ros.recording.recovery import InUseError, recover, recover_left_over
+
+GOLDEN = Path(__file__).parents[1] / 'golden' / 'rosbag2_jazzy.mcap'
+Messages = list[tuple[str, int, Any]]
+
+
+def _messages(path: Path) -> Messages:
+    return list(read_messages(path))
+
+
+@pytest.fixture(scope='module')
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that was recorded to its end."""
+    directory = tmp_path_factory.mktemp('whole')
+    run = example().begin(recorder(directory))
+    example().answer(run)
+    example().play(run)
+    assert run.close() == ''
+    return directory / run.name
+
+
+@pytest.fixture(scope='module')
+def flushed(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, Messages]]:
+    """Lengths of a run's file after each flush, with what it holds by then."""
+    directory = tmp_path_factory.mktemp('flushed')
+    run = example().begin(recorder(directory))
+    part = directory / f'{run.name}.part'
+    states = [(part.stat().st_size, _messages(part))]
+    example().answer(run)
+    states.append((part.stat().st_size, _messages(part)))
+    run.close()
+    return states
+
+
+def _torn(whole: Path, length: int, directory: Path) -> Path:
+    path = directory / f'{whole.name}.part'
+    path.write_bytes(whole.read_bytes()[:length])
+    return path
+
+
+def test_everything_flushed_is_kept_wherever_the_file_is_torn(
+    whole: Path, flushed: list[tuple[int, Messages]], tmp_path: Path
+) -> None:
+    size = whole.stat().st_size
+    (request, _), (answer, _) = flushed
+    offsets = {request, request + 1, answer - 1, answer, answer + 1, size - 1, size}
+    offsets |= {random.Random(1).randrange(request, size) for _ in range(60)}
+    for offset in sorted(offsets):
+        result = recover(_torn(whole, offset, tmp_path))
+        assert result.path == tmp_path / whole.name
+        held = _messages(result.path)
+        assert held == _messages(whole)[: len(held)]
+        for length, messages in flushed:
+            if offset >= length:
+                assert held[: len(messages)] == messages
+        result.path.unlink()
+
+
+def test_recovered_file_has_an_index_and_correct_checksums(
+    whole: Path, flushed: list[tuple[int, Messages]], tmp_path: Path
+) -> None:
+    result = recover(_torn(whole, flushed[1][0] + 7, tmp_path))
+    assert result.path is not None
+    with result.path.open('rb') as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        count = len(list(reader.iter_messages()))
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_count == count == result.kept
+    assert list(tmp_path.iterdir()) == [result.path]
+
+
+def test_torn_tail_is_counted(
+    whole: Path, flushed: list[tuple[int, Messages]], tmp_path: Path
+) -> None:
+    result = recover(_torn(whole, flushed[1][0] + 7, tmp_path))
+    assert (result.kept, result.dropped) == (len(flushed[1][1]), 7)
+
+
+def test_zeros_where_data_should_have_come_are_no_data(
+    whole: Path, flushed: list[tuple[int, Messages]], tmp_path: Path
+) -> None:
+    path = _torn(whole, flushed[1][0], tmp_path)
+    path.write_bytes(path.read_bytes() + bytes(5000))
+    result = recover(path)
+    assert result.path is not None
+    assert _messages(result.path) == flushed[1][1]
+
+
+def test_missing_preview_is_completed_to_what_the_planner_would_have_written(
+    whole: Path, flushed: list[tuple[int, Messages]], tmp_path: Path
+) -> None:
+    result = recover(_torn(whole, flushed[1][0], tmp_path), preview=pictures)
+    assert result.path is not None
+    assert _messages(result.path) == _messages(whole)
+    assert result.problems == ()
+
+
+def test_preview_that_ends_early_is_completed(tmp_path: Path) -> None:
+    run = example().begin(recorder(tmp_path))
+    example().answer(run)
+    played = list(example().preview())
+    for time_ns, topic, message in played[: len(played) // 3]:
+        run.add(topic, message, time_ns)
+    run._file.flush()  # type: ignore[union-attr]
+    run._file.abandon()  # type: ignore[union-attr]
+    result = recover(tmp_path / f'{run.name}.part', preview=pictures)
+    assert result.path is not None
+    times = [(time, topic) for topic, time, _ in _messages(result.path)]
+    assert result.added == len(played) - len(played) // 3
+    assert len(set(times)) == len(times) == result.kept + result.added
+    assert [time for time, _ in times] == sorted(time for time, _ in times)
+
+
+def test_run_without_a_plan_gets_no_preview(tmp_path: Path) -> None:
+    run = example().begin(recorder(tmp_path))
+    run.finish_essential(not_solved(), STAMP)
+    run._file.abandon()  # type: ignore[union-attr]
+    result = recover(tmp_path / f'{run.name}.part', preview=pictures)
+    assert (result.kept, result.added, result.problems) == (2, 0, ())
+
+
+def test_preview_that_fails_does_not_cost_the_record(
+    whole: Path, flushed: list[tuple[int, Messages]], tmp_path: Path
+) -> None:
+    def fail(*_: Any) -> Any:
+        raise CfplanError('no such hand')
+
+    result = recover(_torn(whole, flushed[1][0], tmp_path), preview=fail)
+    assert result.path is not None
+    assert _messages(result.path) == flushed[1][1]
+    assert result.problems == ('no preview added: CfplanError: no such hand',)
+
+
+def test_damaged_chunk_is_left_out_and_the_rest_kept(
+    whole: Path, flushed: list[tuple[int, Messages]], tmp_path: Path
+) -> None:
+    (request, _), (answer, _) = flushed
+    path = _torn(whole, whole.stat().st_size, tmp_path)
+    data = bytearray(path.read_bytes())
+    data[(request + answer) // 2] ^= 0xFF
+    path.write_bytes(data)
+    result = recover(path)
+    assert result.path is not None
+    # With the answer goes the type of the torque limits, which nobody could read without it.
+    assert _messages(result.path) == [
+        (topic, time, message)
+        for topic, time, message in _messages(whole)
+        if (topic, time) not in {(t, s) for t, s, _ in flushed[1][1][1:]}
+        and not topic.endswith('torque_limits')
+    ]
+    assert result.problems[0] == '1 chunk(s) left out that fail their checksum'
+    assert (tmp_path / f'{whole.name}.unreadable').read_bytes() == data
+
+
+def test_other_recordings_are_recovered_beside_the_torn_file(tmp_path: Path) -> None:
+    torn = tmp_path / 'x.mcap'
+    data = GOLDEN.read_bytes()
+    torn.write_bytes(data[: data.rindex(b'rosbag2')])
+    result = recover(torn, preview=pictures)
+    assert result.path == tmp_path / 'x_recovered.mcap'
+    assert torn.exists()
+    with GOLDEN.open('rb') as golden, result.path.open('rb') as file:
+        expected = [
+            (c.topic, m.log_time, m.data) for _, c, m in make_reader(golden).iter_messages()
+        ]
+        held = [(c.topic, m.log_time, m.data) for _, c, m in make_reader(file).iter_messages()]
+    assert held == expected
+
+
+def test_complete_file_is_left_as_it_is(whole: Path) -> None:
+    before = whole.read_bytes()
+    result = recover(whole)
+    assert (result.path, result.kept) == (None, len(_messages(whole)))
+    assert whole.read_bytes() == before
+
+
+def test_output_leaves_the_torn_file(
+    whole: Path, flushed: list[tuple[int, Messages]], tmp_path: Path
+) -> None:
+    part = _torn(whole, flushed[1][0], tmp_path)
+    before = part.read_bytes()
+    recover(part, tmp_path / 'out.mcap')
+    assert part.read_bytes() == before
+    assert _messages(tmp_path / 'out.mcap') == flushed[1][1]
+
+
+def test_output_that_is_there_is_not_overwritten(whole: Path, tmp_path: Path) -> None:
+    part = _torn(whole, whole.stat().st_size - 9, tmp_path)
+    (tmp_path / 'out.mcap').write_text('precious')
+    with pytest.raises(CfplanError, match='is there already'):
+        recover(part, tmp_path / 'out.mcap')
+    assert (tmp_path / 'out.mcap').read_text() == 'precious'
+
+
+@pytest.mark.parametrize(
+    ('data', 'said'),
+    [
+        (b'', 'the file is empty, expected an MCAP file'),
+        (b'# a text file\n', "begins with b'# a text', expected an MCAP file"),
+        (b'\x89MCAP0\r\n', 'holds no complete message'),
+    ],
+)
+def test_file_without_a_message_is_refused(tmp_path: Path, data: bytes, said: str) -> None:
+    path = tmp_path / 'x.mcap'
+    path.write_bytes(data)
+    with pytest.raises(NotMcapError, match=r'x\.mcap: ') as refused:
+        recover(path)
+    assert str(refused.value).endswith(said)
+
+
+def test_failure_to_write_leaves_the_torn_file_alone(
+    whole: Path,
+    flushed: list[tuple[int, Messages]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    part = _torn(whole, flushed[1][0], tmp_path)
+    before = part.read_bytes()
+
+    def fail(*_: Any) -> None:
+        raise OSError(28, 'No space left on device')
+
+    monkeypatch.setattr(Writer, 'finish', fail)
+    with pytest.raises(OSError, match='No space'):
+        recover(part)
+    assert [path.name for path in tmp_path.iterdir()] == [part.name]
+    assert part.read_bytes() == before
+
+
+def test_left_over_runs_are_completed_on_start(
+    whole: Path, flushed: list[tuple[int, Messages]], tmp_path: Path
+) -> None:
+    _torn(whole, flushed[1][0], tmp_path)
+    lines: list[str] = []
+    (completed,) = recover_left_over(tmp_path, pictures, lines.append)
+    assert _messages(completed) == _messages(whole)
+    (line,) = lines
+    assert f'kept {len(flushed[1][1])} messages' in line
+
+
+def test_run_in_use_is_left_to_the_node_that_writes_it(tmp_path: Path) -> None:
+    run = example().begin(recorder(tmp_path))
+    other = recorder(tmp_path)
+    assert other.recover_left_over(pictures) == []
+    with pytest.raises(InUseError):
+        recover(tmp_path / f'{run.name}.part')
+    assert example().answer(run) == run.close() == ''
+    assert read_run(tmp_path / run.name).complete
+
+
+def test_without_locks_a_left_over_run_is_left_alone_and_named(
+    whole: Path,
+    flushed: list[tuple[int, Messages]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: Any) -> None:
+        raise OSError(errno.ENOLCK, 'No locks available')
+
+    monkeypatch.setattr(fcntl, 'flock', fail)
+    part = _torn(whole, flushed[1][0], tmp_path)
+    lines: list[str] = []
+    assert recover_left_over(tmp_path, pictures, lines.append) == []
+    assert lines == [f'{part}: left alone, as no lock tells here whether it is in use']
+
+
+def test_without_locks_a_run_is_recorded_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any) -> None:
+        raise OSError(errno.ENOLCK, 'No locks available')
+
+    monkeypatch.setattr(fcntl, 'flock', fail)
+    run = example().begin(recorder(tmp_path))
+    assert example().answer(run) == run.close() == ''
+
+
+def test_file_of_which_nothing_can_be_read_is_set_aside_once(tmp_path: Path) -> None:
+    part = tmp_path / 'run_1.mcap.part'
+    part.write_bytes(b'\x89MCAP0\r\n garbage')
+    lines: list[str] = []
+    assert recover_left_over(tmp_path, pictures, lines.append) == []
+    assert recover_left_over(tmp_path, pictures, lines.append) == []
+    assert len(lines) == 1
+    assert (tmp_path / 'run_1.mcap.unreadable').read_bytes() == b'\x89MCAP0\r\n garbage'
+
+
+def test_files_of_others_are_not_touched(tmp_path: Path) -> None:
+    (tmp_path / 'film.mkv.part').write_bytes(b'x')
+    recover_left_over(tmp_path, pictures, print)
+    assert [path.name for path in tmp_path.iterdir()] == ['film.mkv.part']
+
+
+def test_missing_directory_holds_nothing_to_recover(tmp_path: Path) -> None:
+    assert recover_left_over(tmp_path / 'missing', pictures, print) == []
+
+
+def test_lock_is_released_when_its_holder_is_killed(tmp_path: Path) -> None:
+    with _recording_process(tmp_path) as (process, names):
+        assert names.poll(timeout=20)
+        process.kill()
+        process.join(timeout=20)
+    for path in tmp_path.glob('*.part'):
+        with path.open('rb') as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_every_run_answered_before_a_kill_is_complete_after_recovery(
+    whole: Path, tmp_path: Path, seed: int
+) -> None:
+    chance = random.Random(seed)
+    answered: list[str] = []
+    with _recording_process(tmp_path) as (process, names):
+        for _ in range(chance.randrange(1, 4)):
+            assert names.poll(timeout=20)
+            answered.append(names.recv())
+        # Some instant of what follows; the process does not end by itself.
+        process.join(timeout=chance.uniform(0.0, 0.05))
+        process.kill()
+        process.join(timeout=20)
+        with suppress(EOFError):
+            while names.poll(timeout=20):
+                answered.append(names.recv())
+    recover_left_over(tmp_path, pictures, print)
+    expected = _messages(whole)
+    for name in answered:
+        assert read_run(tmp_path / name).complete
+        assert _messages(tmp_path / name) == expected
+    assert not list(tmp_path.glob('*.part'))
+
+
+@contextmanager
+def _recording_process(directory: Path) -> Iterator[tuple[BaseProcess, Connection]]:
+    """A process that records runs without end, and sends the name of each that it answered."""
+    played = list(example().preview())
+    names, ours = Pipe(duplex=False)
+    process = get_context('fork').Process(target=_record_forever, args=(directory, played, ours))
+    process.start()
+    ours.close()
+    try:
+        yield process, names
+    finally:
+        process.kill()
+        process.join(timeout=20)
+        names.close()
+
+
+def _record_forever(directory: Path, played: list[Any], names: Connection) -> None:
+    into = recorder(directory)
+    while True:
+        run = example().begin(into)
+        if example().answer(run) == '':
+            names.send(run.name)
+        for time_ns, topic, message in played:
+            run.add(topic, message, time_ns)
+        run.close()
