@@ -122,10 +122,12 @@ def get_global_executor() -> Executor:
     """Return the executor of `spin` and its relatives where none is given."""
     global _global_executor
     context = get_default_context()
-    if _global_executor is None or _global_executor.context is not context:
-        _global_executor = SingleThreadedExecutor()
+    executor = _global_executor
+    if executor is None or executor.context is not context:
+        executor = _global_executor = SingleThreadedExecutor()
+        # This calls back at once if a signal has ended the context before.
         context.on_shutdown(_drop_global_executor)
-    return _global_executor
+    return executor
 
 
 def _drop_global_executor() -> None:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from rclpy import _unsupported
 from rclpy._executor import (
     ConditionReachedException,
     Executor,
@@ -30,6 +31,8 @@ __all__ = [
     'TimeoutException',
 ]
 
+__getattr__ = _unsupported.module_getattr(__name__)
+
 
 class SingleThreadedExecutor(Executor):
     """Runs callbacks one after the other in the thread that spins."""
@@ -41,7 +44,7 @@ class SingleThreadedExecutor(Executor):
         self, future: Future[Any], timeout_sec: float | None = None
     ) -> None:
         future._add_waiter(self.wake)
-        self._spin_once(timeout_sec, future.done)
+        self._spin_once(timeout_sec, lambda: future.done() or future.cancelled())
 
     def _spin_once(self, timeout_sec: float | None, condition: Callable[[], bool]) -> None:
         try:
@@ -80,7 +83,7 @@ class MultiThreadedExecutor(Executor):
         self, future: Future[Any], timeout_sec: float | None = None
     ) -> None:
         future._add_waiter(self.wake)
-        self._spin_once(timeout_sec, future.done)
+        self._spin_once(timeout_sec, lambda: future.done() or future.cancelled())
 
     def shutdown(self, timeout_sec: float | None = None, *, wait_for_threads: bool = True) -> bool:
         """Run no more callbacks and wait for those that run.

@@ -105,7 +105,7 @@ def test_shutdown_destroys_the_nodes(ros):
 
 def test_a_node_needs_init():
     with pytest.raises(
-        NotInitializedException, match=r"rclpy\.init\(\) has not been called.*cannot create node"
+        NotInitializedException, match=r'rclpy\.init\(\) has not been called.*cannot create node'
     ):
         rclpy.create_node('early')
 

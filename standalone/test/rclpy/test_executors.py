@@ -164,8 +164,10 @@ def test_spin_until_future_complete_ends_with_the_time(executor):
 def test_spin_until_future_complete_ends_when_another_thread_cancels(executor):
     future = Future()
     threading.Timer(0.05, future.cancel).start()
+    start = time.monotonic()
     executor.spin_until_future_complete(future, TIMEOUT)
     assert future.cancelled()
+    assert time.monotonic() - start < TIMEOUT / 2
 
 
 def test_a_done_callback_runs_in_the_thread_that_spins(executor):

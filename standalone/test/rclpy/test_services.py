@@ -3,12 +3,12 @@ from __future__ import annotations
 import threading
 
 import pytest
-from std_msgs.msg import String
-from std_srvs.srv import SetBool, Trigger
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import MultiThreadedExecutor
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
 
 CLIENT = """
 import sys, rclpy
@@ -143,9 +143,7 @@ def test_a_destroyed_client_is_not_used(node):
         client.call_async(Trigger.Request())
 
 
-def test_a_thousand_calls_in_a_row_from_another_process_are_answered(
-    node, until, program
-):
+def test_a_thousand_calls_in_a_row_from_another_process_are_answered(node, until, program):
     served = []
 
     def serve(request, response):

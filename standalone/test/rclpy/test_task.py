@@ -56,9 +56,7 @@ def test_an_exception_that_nobody_asked_for_is_reported(capsys):
     future.set_exception(ValueError('lost'))
     del future
     gc.collect()
-    assert capsys.readouterr().err == (
-        'The following exception was never retrieved: lost\n'
-    )
+    assert capsys.readouterr().err == ('The following exception was never retrieved: lost\n')
 
 
 def test_an_exception_that_was_asked_for_is_not_reported(capsys):

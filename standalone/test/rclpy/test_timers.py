@@ -4,7 +4,6 @@ import threading
 import time
 
 import pytest
-from rosgraph_msgs.msg import Clock as ClockMessage
 
 import rclpy
 from rclpy.clock import ROSClock
@@ -13,6 +12,7 @@ from rclpy.exceptions import InvalidHandle, RCLError, ROSInterruptException
 from rclpy.parameter import Parameter
 from rclpy.time import Time
 from rclpy.timer import Timer, TimerInfo
+from rosgraph_msgs.msg import Clock as ClockMessage
 
 SECOND = 1_000_000_000
 

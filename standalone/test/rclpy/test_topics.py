@@ -1,8 +1,6 @@
 from __future__ import annotations
 
 import pytest
-from std_msgs.msg import Int32, String
-from std_srvs.srv import Trigger
 
 import rclpy
 from rclpy.duration import Duration
@@ -10,6 +8,8 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.exceptions import InvalidHandle, RCLError, UnsupportedEventTypeError
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import Int32, String
+from std_srvs.srv import Trigger
 
 
 def test_a_callback_gets_every_message_in_order(node, until):
@@ -145,9 +145,7 @@ def test_a_destroyed_subscription_gets_nothing_more(node, until):
 
 
 def test_names_are_full_names_after_expansion(node):
-    names = [
-        node.create_publisher(Int32, topic, 1).topic_name for topic in ('a', '/b', '~/c')
-    ]
+    names = [node.create_publisher(Int32, topic, 1).topic_name for topic in ('a', '/b', '~/c')]
     assert names == ['/a', '/b', '/tested/c']
 
 

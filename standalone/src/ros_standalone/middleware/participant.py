@@ -6,6 +6,7 @@ import atexit
 import os
 import threading
 import weakref
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ros_standalone.middleware import discovery_info, library, names
@@ -20,8 +21,9 @@ from ros_standalone.middleware.qos import (
     DdsQos,
     best_available,
     dds_qos_from,
-    keeping_all,
+    deep,
     native_qos,
+    unlimited,
 )
 from ros_standalone.middleware.services import CLIENT_KEY, SERVER_KEY, Client, Server
 from ros_standalone.middleware.topics import Topics
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
 
 _FAREWELL_S = 0.2
+_UNCONFIRMED = 1000
 
 _participants: weakref.WeakSet[Participant] = weakref.WeakSet()
 
@@ -284,8 +287,6 @@ class Participant:
         self._services += 1
         identifier = self.gid[:12] + self._services.to_bytes(4, 'big')
         user_data = pack_user_data({key: dotted_hex(identifier), 'typehash': type_hash})
-        # All clients of a service share its topics: who kept only the last messages would lose
-        # one that was not taken or confirmed yet when others are quicker.
         policies = dds_qos_from(qos)
         return (
             EndpointPlan(
@@ -303,6 +304,11 @@ class Participant:
         )
 
     def _pair(self, heard: EndpointPlan, said: EndpointPlan) -> tuple[Reader, Writer]:
+        # All clients of a service share its topics: a reader that kept only the last messages
+        # would lose one that is not taken yet when others are quicker. A writer that kept all
+        # would wait for a client that hangs, and every other client with it.
+        heard = replace(heard, qos=unlimited(heard.qos))
+        said = replace(said, qos=deep(said.qos, _UNCONFIRMED))
         reader = Reader(self._handle, self._topics, heard, _nothing)
         try:
             return reader, Writer(self._handle, self._topics, said, _nothing)

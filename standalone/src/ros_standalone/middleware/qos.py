@@ -74,9 +74,14 @@ def dds_qos_from(profile: QoSProfile) -> DdsQos:
     )
 
 
-def keeping_all(qos: DdsQos) -> DdsQos:
-    """The same policies with a history without end."""
+def unlimited(qos: DdsQos) -> DdsQos:
+    """The same policies, where nothing is dropped that was not taken yet."""
     return replace(qos, history=_KEEP_ALL, depth=_UNLIMITED)
+
+
+def deep(qos: DdsQos, depth: int) -> DdsQos:
+    """The same policies with at least this depth."""
+    return qos if qos.history == _KEEP_ALL else replace(qos, depth=max(qos.depth, depth))
 
 
 def best_available(profile: QoSProfile, writers: list[DdsQos]) -> DdsQos:
