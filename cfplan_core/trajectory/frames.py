@@ -16,6 +16,7 @@ from cfplan_core.planning.search import Leg
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
 from cfplan_core.trajectory.plan_result import Segment
+from cfplan_core.trajectory.timing import frame_times
 
 # Largest change between frames of a joint or of the object's angle, in rad, and of its position,
 # in object sizes. The format cfplan/plan/1 allows 0.05 of each; half of that for the position
@@ -57,7 +58,7 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
     """Sample a path into frames.
 
     A frame shared by two segments carries the torque limits of the earlier one. Times follow from
-    the joints' velocity limits: one joint moves at its limit.
+    the joints' velocity limits (`frame_times`).
 
     Args:
         system: Compiled problem.
@@ -82,7 +83,7 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
             first += len(z) - 1
     z = np.concatenate(points)
     return Frames(
-        _times(system, z[:, 3:]),
+        frame_times(z[:, 3:], np.array([j.velocity_limit for j in system.problem.hand.joints])),
         z[:, 3:],
         system.object_poses(z),
         np.concatenate(lower),
@@ -148,11 +149,3 @@ def _torque_limits(
     weight = system.link_weight_torques(z)
     unit = system.force_unit * system.size
     return (lower + weight) * unit, (upper + weight) * unit
-
-
-def _times(system: ContactSystem, joints: FloatArray) -> FloatArray:
-    """Times at which each step takes as long as its fastest joint needs, shape (f,), s."""
-    limits = np.array([joint.velocity_limit for joint in system.problem.hand.joints])
-    steps = (np.abs(np.diff(joints, axis=0)) / limits).max(axis=1, initial=0.0)
-    # A longer time than needed guards the limit against rounding.
-    return np.concatenate([[0.0], np.cumsum(np.maximum(steps * (1.0 + 1e-9), 1e-6))])

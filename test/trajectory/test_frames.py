@@ -124,7 +124,7 @@ def test_times_strictly_increase_from_zero(name: str, cases: dict[str, Case]) ->
 
 
 @every_case
-def test_every_step_takes_as_long_as_its_fastest_joint_needs(
+def test_every_step_takes_as_long_as_its_fastest_joint_needs_or_half_as_long_again(
     name: str, cases: dict[str, Case]
 ) -> None:
     frames = cases[name].frames
@@ -132,7 +132,7 @@ def test_every_step_takes_as_long_as_its_fastest_joint_needs(
     speeds = np.abs(np.diff(frames.joints, axis=0)) / np.diff(frames.times)[:, None]
     fastest = (speeds / limits).max(axis=1)
     assert (fastest <= 1.0).all()
-    np.testing.assert_allclose(fastest, 1.0, rtol=1e-6)
+    assert (fastest >= 1.0 / 1.5001).all()
 
 
 @every_case
@@ -309,7 +309,7 @@ def test_slow_joint_sets_the_pace() -> None:
     slow = replace(right, joints=(replace(right.joints[0], velocity_limit=0.01),))
     frames = pushed(with_fingers(pushed_block(), left, slow), 0.0, 0.004).frames
     turned = abs(frames.joints[-1, 1] - frames.joints[0, 1])
-    assert frames.times[-1] == pytest.approx(turned / 0.01, rel=1e-6)
+    assert turned / 0.01 <= frames.times[-1] <= 1.5001 * turned / 0.01
 
 
 def test_weight_of_a_link_is_added_to_both_limits() -> None:
