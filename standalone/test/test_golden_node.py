@@ -1,4 +1,4 @@
-"""The node of the golden data runs here unchanged; what `ros2` printed of it on a real Jazzy holds.
+"""The golden node runs here unchanged, and what `ros2` printed of it on a real Jazzy holds.
 
 Each function named after a `ros2` command asks the graph or calls the services as that command
 does, through the standalone rclpy in another process, and prints in its format.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 from collections.abc import Callable
 from types import TracebackType
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_or_drop, serialize_message
+from ros_standalone.middleware import ClosedError
 
 if TYPE_CHECKING:
     from rclpy._executor import Executor
@@ -86,12 +88,17 @@ class Service:
         callback, response = self.callback, self.srv_type.Response()
 
         def answer() -> None:
-            self.send_response(callback(request, response), header)
+            self._respond(callback(request, response), header)
 
         async def answer_later() -> None:
-            self.send_response(await callback(request, response), header)
+            self._respond(await callback(request, response), header)
 
         return answer_later if inspect.iscoroutinefunction(callback) else answer
+
+    def _respond(self, response: Any, header: RequestId) -> None:
+        # Where the service was destroyed while the callback ran, there is nobody to be told.
+        with contextlib.suppress(InvalidHandle, ClosedError):
+            self.send_response(response, header)
 
     def _take(self) -> tuple[RequestId, Any] | None:
         """Return the next request with its header, None if there is none."""

@@ -185,12 +185,13 @@ class Task(Future[T]):
         """Run the function to its end, or the coroutine to its next wait."""
         if self._done or not self._task_lock.acquire(blocking=False):
             return
+        wait_for = None
         try:
             if self._done or self._cancelled:
                 return
             self._executing = True
             if inspect.iscoroutine(self._handler):
-                self._step(self._handler)
+                wait_for = self._step(self._handler)
             else:
                 self._run()
         except BaseException:
@@ -200,6 +201,9 @@ class Task(Future[T]):
         finally:
             self._executing = False
             self._task_lock.release()
+        # Only now, as another thread may go on with the task at once.
+        if wait_for is not None:
+            wait_for(self._resume)
 
     def executing(self) -> bool:
         """Return whether the task runs at this moment."""
@@ -217,7 +221,10 @@ class Task(Future[T]):
             self._release()
             self.set_result(result)
 
-    def _step(self, coroutine: Coroutine[Any, Any, T]) -> None:
+    def _step(
+        self, coroutine: Coroutine[Any, Any, T]
+    ) -> Callable[[Callable[[], None]], None] | None:
+        """Go on with the coroutine; return what arranges its resumption unless it has ended."""
         try:
             awaited = coroutine.send(None)
         except StopIteration as stop:
@@ -227,10 +234,8 @@ class Task(Future[T]):
             self._release()
             self.set_exception(error)
         else:
-            if isinstance(awaited, Future):
-                awaited._add_waiter(self._resume)
-            else:
-                self._resume()
+            return awaited._add_waiter if isinstance(awaited, Future) else _at_once
+        return None
 
     def _resume(self) -> None:
         executor = self._get_executor()
@@ -241,3 +246,7 @@ class Task(Future[T]):
         self._handler = None
         self._args = ()
         self._kwargs = {}
+
+
+def _at_once(resume: Callable[[], None]) -> None:
+    resume()

@@ -138,6 +138,24 @@ def test_a_coroutine_goes_on_when_another_thread_ends_what_it_waits_for(executor
     assert task.result() == 'here'
 
 
+def test_a_coroutine_in_a_pool_misses_no_end_of_what_it_waits_for(node, executor):
+    executor.shutdown()
+
+    async def wait_often():
+        for _ in range(200):
+            future = Future()
+            setter = threading.Thread(target=future.set_result, args=[None])
+            setter.start()
+            await future
+        return True
+
+    with MultiThreadedExecutor(4) as threaded:
+        tasks = [threaded.create_task(wait_often) for _ in range(4)]
+        for task in tasks:
+            threaded.spin_until_future_complete(task, TIMEOUT)
+    assert [task.result() for task in tasks] == [True] * 4
+
+
 def test_tasks_that_always_go_on_do_not_starve_entities(node, executor):
     called = Future()
 

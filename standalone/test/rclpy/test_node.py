@@ -148,7 +148,7 @@ def test_what_is_not_covered_says_so(ros):
     with pytest.raises(NotImplementedError, match='not part of the standalone rclpy'):
         rclpy.create_node('n', enable_logger_service=True)
     with pytest.raises(AttributeError, match='not part of the standalone rclpy'):
-        rclpy.no_such_name
+        rclpy.no_such_name  # noqa: B018
     with pytest.raises(ImportError, match='not part of the standalone rclpy'):
         __import__('rclpy.action')
     with pytest.raises(ImportError, match=r'rclpy\.experimental.* is not part of the standalone'):
@@ -156,4 +156,4 @@ def test_what_is_not_covered_says_so(ros):
     with pytest.raises(ImportError, match='EventsExecutor'):
         from rclpy.executors import EventsExecutor  # noqa: F401
     with pytest.raises(AttributeError, match='EventsExecutor is not part of the standalone rclpy'):
-        rclpy.executors.EventsExecutor
+        rclpy.executors.EventsExecutor  # noqa: B018

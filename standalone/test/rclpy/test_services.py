@@ -71,7 +71,7 @@ def test_waiting_for_a_service_ends_when_it_comes(node):
 
 def test_a_request_of_another_type_is_refused(node):
     client = node.create_client(SetBool, 'echo')
-    with pytest.raises(TypeError, match='Expected .*SetBool_Request.*, got .*String'):
+    with pytest.raises(TypeError, match=r'Expected .*SetBool_Request.*, got .*String'):
         client.call_async(String())
 
 
@@ -80,7 +80,7 @@ def test_a_response_of_another_type_comes_out_of_spin(node, executor):
     client = node.create_client(SetBool, 'wrong')
     assert client.wait_for_service(10.0)
     future = client.call_async(SetBool.Request())
-    with pytest.raises(TypeError, match='Expected .*SetBool_Response.*, got .*Trigger_Response'):
+    with pytest.raises(TypeError, match=r'Expected .*SetBool_Response.*, got .*Trigger_Response'):
         executor.spin_until_future_complete(future, 10.0)
 
 
@@ -131,6 +131,18 @@ def test_a_call_that_was_given_up_stays_unanswered(node, executor, until):
     assert not given_up.done()
 
 
+def test_a_service_may_be_destroyed_by_its_own_callback(node, executor):
+    def answer(request, response):
+        node.destroy_service(service)
+        return response
+
+    service = node.create_service(Trigger, 'once', answer)
+    client = node.create_client(Trigger, 'once')
+    assert client.wait_for_service(10.0)
+    executor.spin_until_future_complete(client.call_async(Trigger.Request()), 0.2)
+    assert service not in list(node.services)
+
+
 def test_what_is_no_service_class_is_refused(node):
     with pytest.raises(RuntimeError, match='The service type provided is not valid'):
         node.create_client(String, 'x')
@@ -141,6 +153,60 @@ def test_a_destroyed_client_is_not_used(node):
     assert node.destroy_client(client)
     with pytest.raises(InvalidHandle):
         client.call_async(Trigger.Request())
+
+
+def test_a_server_that_comes_back_answers_the_client_that_waited(node, executor, program):
+    server = """
+import sys, rclpy
+from std_srvs.srv import Trigger
+rclpy.init(args=[])
+node = rclpy.create_node('server')
+def answer(request, response):
+    response.message = sys.argv[1]
+    return response
+node.create_service(Trigger, '/again', answer)
+rclpy.spin(node)
+"""
+    client = node.create_client(Trigger, '/again')
+    answers = []
+    for name in ('first', 'second'):
+        process = program(server, name)
+        assert client.wait_for_service(20.0)
+        future = client.call_async(Trigger.Request())
+        executor.spin_until_future_complete(future, 20.0)
+        answers.append(future.result().message)
+        process.terminate()
+        process.wait(10.0)
+        graph = node.context.participant.graph
+        assert graph.wait_until(lambda: not client.service_is_ready(), 20.0)
+    assert answers == ['first', 'second']
+
+
+def test_a_client_that_dies_in_mid_call_leaves_the_server_serving(node, until, program):
+    dying = program("""
+import rclpy
+from std_srvs.srv import Trigger
+rclpy.init(args=[])
+node = rclpy.create_node('dying')
+client = node.create_client(Trigger, '/slow')
+assert client.wait_for_service(20.0)
+client.call(Trigger.Request())
+""")
+    calls = []
+
+    def answer(request, response):
+        if not calls:
+            dying.kill()
+            dying.wait(10.0)
+        calls.append(True)
+        return response
+
+    node.create_service(Trigger, '/slow', answer)
+    until(lambda: calls)
+    survivor = node.create_client(Trigger, '/slow')
+    future = survivor.call_async(Trigger.Request())
+    until(future.done)
+    assert calls == [True, True]
 
 
 def test_a_thousand_calls_in_a_row_from_another_process_are_answered(node, until, program):

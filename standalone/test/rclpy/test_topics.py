@@ -8,7 +8,7 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.exceptions import InvalidHandle, RCLError, UnsupportedEventTypeError
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import Int32, String
+from std_msgs.msg import Int32, String, UInt8MultiArray
 from std_srvs.srv import Trigger
 
 
@@ -53,6 +53,25 @@ def test_a_raw_subscription_gets_the_bytes_that_the_serializer_makes(node, until
     assert deserialize_message(got[0], String) == message
 
 
+def test_a_message_of_a_megabyte_arrives_from_another_process(node, until, program):
+    got = []
+    node.create_subscription(UInt8MultiArray, '/large', got.append, 1)
+    program("""
+import sys, rclpy
+from std_msgs.msg import UInt8MultiArray
+rclpy.init(args=[])
+node = rclpy.create_node('large')
+publisher = node.create_publisher(UInt8MultiArray, '/large', 1)
+while not publisher.get_subscription_count():
+    rclpy.spin_once(node, timeout_sec=0.02)
+publisher.publish(UInt8MultiArray(data=bytes(range(256)) * 4096))
+publisher.wait_for_all_acked()
+sys.stdin.read()
+""")
+    until(lambda: got)
+    assert bytes(got[0].data) == bytes(range(256)) * 4096
+
+
 def test_bytes_are_published_as_they_are(node, until):
     got = []
     node.create_subscription(String, 'texts', got.append, 10)
@@ -77,7 +96,7 @@ def test_bytes_that_are_no_message_are_dropped_and_reported(node, until, capfd):
 
 def test_a_message_of_another_type_is_refused(node):
     publisher = node.create_publisher(Int32, 'numbers', 10)
-    with pytest.raises(TypeError, match='Expected .*Int32.*, got .*String'):
+    with pytest.raises(TypeError, match=r'Expected .*Int32.*, got .*String'):
         publisher.publish(String())
 
 
@@ -167,5 +186,5 @@ def test_a_profile_must_be_a_profile_or_a_depth(node):
 
 @pytest.mark.parametrize('events', [PublisherEventCallbacks, SubscriptionEventCallbacks])
 def test_a_qos_event_callback_is_refused_by_name(events):
-    with pytest.raises(UnsupportedEventTypeError, match='not part of .* asked for: deadline'):
+    with pytest.raises(UnsupportedEventTypeError, match=r'not part of .* asked for: deadline'):
         events(deadline=print)
