@@ -120,19 +120,21 @@ def _answer_to(request: Any, node_name: str, wait: float) -> Any:
     """Call the planner's service; None, with a complaint, if it does not answer."""
     import rclpy
     from cfplan_msgs.srv import PlanManipulation
+    from rclpy.exceptions import NameValidationException
+    from rclpy.executors import SingleThreadedExecutor
     from rclpy.signals import SignalHandlerOptions
 
     # Without handlers of its own Ctrl-C is Python's KeyboardInterrupt, as in every other command.
     context = rclpy.Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
-    executor = rclpy.executors.SingleThreadedExecutor(context=context)
+    executor = SingleThreadedExecutor(context=context)
     node = rclpy.create_node('cfplan_call', context=context)
     try:
         executor.add_node(node)
         service = f'/{node_name.strip("/")}/plan'
         try:
             client = node.create_client(PlanManipulation, service)
-        except ValueError as error:
+        except NameValidationException as error:
             raise CfplanError(f'--node {node_name}: {error}') from error
         if not client.wait_for_service(timeout_sec=wait):
             complain(f'no planner offers {service}, waited {wait:g} s; start one with: cfplan node')

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import sys
 import threading
 import time
@@ -19,15 +18,14 @@ from typing import Any
 import rclpy
 from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import GetParameters
+from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Int64, String, UInt8MultiArray
 
 WAIT = 30.0
-LATCHED = QoSProfile(
-    history=HistoryPolicy.KEEP_ALL, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
+LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Worker:
@@ -40,7 +38,7 @@ class Worker:
         self.released = threading.Semaphore(0)
         self.clients: dict[str, Any] = {}
         self.publishers: dict[str, Any] = {}
-        self.texts: dict[str, list[str]] = {}
+        self.received: dict[str, list[Any]] = {}
         self.futures: list[Any] = []
         threading.Thread(target=self._spin, daemon=True).start()
 
@@ -75,6 +73,9 @@ class Worker:
         self.released.acquire()
         return self._answer(request, response)
 
+    def held_requests(self) -> int:
+        return self.held
+
     def wait_held(self, count: int) -> bool:
         """Wait until so many requests have come to the service that holds them."""
         with self.changed:
@@ -90,10 +91,25 @@ class Worker:
     # Clients
 
     def connect(self, service: str) -> bool:
-        client = self.node.create_client(GetParameters, service)
-        self.clients[service] = client
-        ready: bool = client.wait_for_service(WAIT)
+        """Make a client; returns whether it finds a server."""
+        self.clients[service] = self.node.create_client(GetParameters, service)
+        return self.wait_ready(service)
+
+    def wait_ready(self, service: str) -> bool:
+        ready: bool = self.clients[service].wait_for_service(WAIT)
         return ready
+
+    def wait_unready(self, service: str) -> bool:
+        client = self.clients[service]
+        return self._graph_shows(lambda: not client.service_is_ready())
+
+    def wait_service_of(self, node: str, service: str) -> bool:
+        """Wait until a node of the root namespace is known to offer a service."""
+        offered = (service, ['rcl_interfaces/srv/GetParameters'])
+        graph = self.node.context.participant.graph
+        return self.node.wait_for_node(node, WAIT) and self._graph_shows(
+            lambda: offered in graph.services_by_node(node, '/')
+        )
 
     def call(self, service: str, prefix: str, count: int) -> int:
         """Call one after another; returns how many were answered with their own key."""
@@ -105,12 +121,11 @@ class Worker:
             answered += [value.string_value for value in response.values] == [key]
         return answered
 
-    def call_large(self, service: str, size: int) -> bool:
-        """Call with a long key; returns whether it came back."""
-        key = _text(size)
-        request = GetParameters.Request(names=[key])
+    def call_text(self, service: str, size: int) -> bool:
+        """Call with a key of so many bytes; returns whether it came back."""
+        request = GetParameters.Request(names=[_text(size)])
         response = self.clients[service].call(request, timeout_sec=WAIT)
-        returned: bool = response.values[0].string_value == key
+        returned: bool = response.values[0].string_value == request.names[0]
         return returned
 
     def send(self, service: str, key: str) -> None:
@@ -118,76 +133,91 @@ class Worker:
         request = GetParameters.Request(names=[key])
         self.futures.append(self.clients[service].call_async(request))
 
-    def send_large(self, service: str, size: int) -> None:
-        """Send a request with a long key and do not wait."""
+    def send_text(self, service: str, size: int) -> None:
+        """Send a request with a key of so many bytes and do not wait."""
         self.send(service, _text(size))
 
     def answered(self) -> list[bool]:
         """Which of the sent requests were answered."""
         return [future.done() for future in self.futures]
 
-    def forget(self, service: str) -> int:
-        """Give up the sent requests; returns how many are still awaited then."""
-        for future in self.futures:
-            self.clients[service].remove_pending_request(future)
+    def pending(self, service: str) -> int:
+        """How many requests the client waits for."""
         return len(self.clients[service]._pending)
 
-    def is_ready(self, service: str) -> bool:
-        ready: bool = self.clients[service].service_is_ready()
-        return ready
+    def forget(self, service: str) -> None:
+        """Give up the sent requests."""
+        for future in self.futures:
+            self.clients[service].remove_pending_request(future)
 
     # Topics
 
     def send_back(self, there: str, back: str) -> None:
         """Publish on one topic the arrays that come on the other."""
         publisher = self.node.create_publisher(UInt8MultiArray, back, 10)
+        self.publishers[back] = publisher
         self.node.create_subscription(UInt8MultiArray, there, publisher.publish, 10)
 
-    def advertise(self, topic: str, depth: int) -> None:
+    def advertise(self, topic: str, depth: int = 10) -> None:
         self.publishers[topic] = self.node.create_publisher(Int64, topic, depth)
 
-    def wait_subscribed(self, topic: str, count: int) -> bool:
+    def wait_subscribed(self, topic: str) -> bool:
         publisher = self.publishers[topic]
-        return self._graph_shows(lambda: publisher.get_subscription_count() >= count)
+        return self._graph_shows(lambda: publisher.get_subscription_count() > 0)
 
-    def publish_numbers(self, topic: str, first: int, count: int, period: float) -> list[float]:
-        """Publish whole numbers in time; returns the seconds it took, and whether all arrived."""
+    def publish_numbers(self, topic: str, count: int, period: float) -> float:
+        """Publish 0, 1, ... with so many seconds between; returns how long it took [s]."""
         publisher = self.publishers[topic]
         start = time.monotonic()
-        for index in range(count):
-            time.sleep(max(0.0, start + index * period - time.monotonic()))
-            publisher.publish(Int64(data=first + index))
+        for number in range(count):
+            time.sleep(max(0.0, start + number * period - time.monotonic()))
+            publisher.publish(Int64(data=number))
         taken = time.monotonic() - start
-        return [taken, float(publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=WAIT)))]
+        assert publisher.wait_for_all_acked(Duration(seconds=WAIT))
+        return taken
+
+    def count(self, topic: str, depth: int = 10) -> None:
+        """Note the numbers of a topic."""
+        self._note(Int64, topic, depth)
+
+    def counted(self, topic: str, count: int) -> list[int]:
+        """The numbers that came, as soon as there are so many."""
+        return self._noted(topic, count)
 
     def say(self, topic: str, text: str) -> None:
         """Publish a text that late subscribers get, too."""
-        if topic not in self.publishers:
-            self.publishers[topic] = self.node.create_publisher(String, topic, LATCHED)
-        self.publishers[topic].publish(String(data=text))
+        publisher = self.node.create_publisher(String, topic, LATCHED)
+        publisher.publish(String(data=text))
 
     def listen(self, topic: str) -> None:
         """Note the texts of a topic."""
-        texts = self.texts[topic] = []
-
-        def note(message: String) -> None:
-            with self.changed:
-                texts.append(message.data)
-                self.changed.notify_all()
-
-        self.node.create_subscription(String, topic, note, LATCHED)
+        self._note(String, topic, LATCHED)
 
     def heard(self, topic: str, count: int) -> list[str]:
-        """The texts that came, as soon as there are so many."""
+        """The texts that came, in alphabetical order, as soon as there are so many."""
+        return sorted(self._noted(topic, count))
+
+    def _note(self, message_type: Any, topic: str, qos: QoSProfile | int) -> None:
+        received = self.received[topic] = []
+
+        def note(message: Any) -> None:
+            with self.changed:
+                received.append(message.data)
+                self.changed.notify_all()
+
+        self.node.create_subscription(message_type, topic, note, qos)
+
+    def _noted(self, topic: str, count: int) -> list[Any]:
         with self.changed:
-            self.changed.wait_for(lambda: len(self.texts[topic]) >= count, WAIT)
-            return sorted(self.texts[topic])
+            self.changed.wait_for(lambda: len(self.received[topic]) >= count, WAIT)
+            return list(self.received[topic])
 
     # Nodes
 
-    def nodes(self, count: int) -> list[str]:
-        """The names of the nodes, as soon as there are so many."""
-        self._graph_shows(lambda: len(self.node.get_node_names()) >= count)
+    def wait_node_count(self, count: int) -> bool:
+        return self._graph_shows(lambda: len(self.nodes()) == count)
+
+    def nodes(self) -> list[str]:
         return sorted(self.node.get_node_names())
 
     def add_nodes(self, prefix: str, count: int) -> None:
