@@ -20,7 +20,6 @@ from cfplan_ros.conversions.requests import (
     time_budget,
 )
 from cfplan_ros.conversions.times import duration_message, stamp_of
-from cfplan_ros.conversions.velocities import followable
 from cfplan_ros.visualization.frames import static_transforms
 from cfplan_ros.visualization.markers import scene_markers
 from cfplan_ros.visualization.preview import preview
@@ -122,7 +121,6 @@ def carry_out(task: Task, cancel: threading.Event, now: Callable[[], int]) -> An
         return refused(code, str(task.error), task.request, task.setup, now())
     result = plan(task.problem, task.options, cancel=cancel)
     if result.status is not Status.INVALID:
-        result = followable(result, task.problem.hand)
         return response_of(result, task.setup.frame_id, stamp_of(now()))
     error = invalid_grasps(result, task.problem, task.request, task.setup)
     response = refused(error.code, str(error), task.request, task.setup, now())

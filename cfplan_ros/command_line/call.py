@@ -137,7 +137,9 @@ def _answer_to(request: Any, node_name: str, wait: float) -> Any:
         except NameValidationException as error:
             raise CfplanError(f'--node {node_name}: {error}') from error
         if not client.wait_for_service(timeout_sec=wait):
-            complain(f'no planner offers {service}, waited {wait:g} s; start one with: cfplan node')
+            complain(
+                f'no planner offers {service}, waited {wait:g} s; start one with: cfplan node'
+            )
             return None
         future = client.call_async(request)
         while not future.done():

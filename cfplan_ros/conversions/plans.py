@@ -20,6 +20,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from cfplan_core.errors import Finding, InvalidPlanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.trajectory.plan_result import PlanResult, Segment, Statistics, Status
+from cfplan_core.trajectory.timing import joint_velocities
 from cfplan_ros.conversions.contacts import contact_names, formation_message
 from cfplan_ros.conversions.poses import pose_message
 from cfplan_ros.conversions.stabilities import NAMES, NUMBERS
@@ -29,9 +30,9 @@ from cfplan_ros.conversions.times import (
     duration_of,
     nanoseconds_of,
     seconds_of,
+    whole_nanoseconds,
 )
 from cfplan_ros.conversions.trees import tree_message, tree_nodes
-from cfplan_ros.conversions.velocities import joint_velocities, whole_nanoseconds
 
 _Response = PlanManipulation.Response
 
@@ -69,7 +70,7 @@ def plan_message(result: PlanResult, frame_id: str, stamp: Time) -> Manipulation
 
     The first point of the trajectory, at time zero, is the start grasp, where the hand is. Times
     are the plan's to the nanosecond and strictly increasing. Velocities are those of
-    `joint_velocities`: within the joints' limits if the plan is `followable`.
+    `joint_velocities`, for which the planner makes its times.
 
     Args:
         result: Any outcome; one without a plan has header, name, trees and counts.
@@ -132,7 +133,7 @@ def response_of(
     """Return the answer to a request that was planned.
 
     Args:
-        result: A `followable` plan, or why there is none. For one whose status is invalid
+        result: A plan, or why there is none. For one whose status is invalid
             `invalid_grasps` and `refusal` say more in the request's words.
         frame_id: As of `plan_message`.
         stamp: As of `plan_message`.

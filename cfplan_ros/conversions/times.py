@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 from builtin_interfaces.msg import Duration, Time
+from numpy.typing import NDArray
 
 from cfplan_core.errors import CfplanError
-
-NANOSECONDS = 1_000_000_000
-"""In a second."""
+from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.trajectory.timing import NANOSECONDS as NANOSECONDS
 
 LONGEST = 2**31 - 1
 """Seconds that a message can hold."""
@@ -47,3 +48,17 @@ def nanoseconds_of(message: Duration | Time) -> int:
 def seconds_of(message: Duration | Time) -> float:
     """Return a duration or a point in time in seconds, the nearest that a float holds."""
     return nanoseconds_of(message) / NANOSECONDS
+
+
+def whole_nanoseconds(times: FloatArray) -> NDArray[np.int64]:
+    """Round times to nanoseconds that still increase strictly, shape (f,).
+
+    Raises:
+        CfplanError: A time is too long for a message.
+    """
+    if len(times) and not times[-1] <= LONGEST:
+        raise CfplanError(f'a plan of {times[-1]:g} s: expected at most {LONGEST} s')
+    rounded = np.rint(times * NANOSECONDS).astype(np.int64)
+    # The smallest strictly increasing sequence above the rounded one.
+    place = np.arange(len(rounded))
+    return np.asarray(np.maximum.accumulate(rounded - place) + place)

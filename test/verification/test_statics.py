@@ -127,9 +127,7 @@ def test_form_closure_is_found_where_all_triples_say_so(
     assert (closure_margin(held) > 1e-9) == spans
 
 
-@settings(
-    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.filter_too_much]
-)
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
 @given(contacts=CONTACTS, arms=st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6))
 def test_torque_limits_are_those_of_the_corners_of_the_force_polytope(
     contacts: list[tuple[float, float, float]], arms: list[float]

@@ -8,7 +8,6 @@ from ros.conversions.example_files import PROBLEM_FILES, STORY_FILE
 from cfplan_core import PlanResult, Problem, load_problem, plan
 from cfplan_ros.conversions.hands import load_hand
 from cfplan_ros.conversions.requests import Setup
-from cfplan_ros.conversions.velocities import followable
 
 
 @pytest.fixture(scope='session')
@@ -25,8 +24,8 @@ def setup() -> Setup:
 
 @pytest.fixture(scope='session')
 def story_plan(story: Problem) -> PlanResult:
-    """The plan of 1991, as a controller can follow it."""
-    return followable(plan(story), story.hand)
+    """The plan of 1991."""
+    return plan(story)
 
 
 @pytest.fixture(scope='session', params=PROBLEM_FILES, ids=lambda file: file.stem)

@@ -28,9 +28,9 @@ from cfplan_core import (
     plan,
 )
 from cfplan_core.trajectory.plan_result import TreeNode
+from cfplan_core.trajectory.timing import joint_velocities
 from cfplan_ros.conversions.plans import plan_message, plan_result, refusal, response_of
 from cfplan_ros.conversions.times import nanoseconds_of
-from cfplan_ros.conversions.velocities import followable, joint_velocities
 
 Response = PlanManipulation.Response
 STAMP = Time(sec=1_700_000_000, nanosec=123_456_789)
@@ -154,8 +154,7 @@ def test_an_answer_without_a_plan_has_name_trees_and_counts(
 def test_an_example_can_be_followed_by_a_controller(
     example: tuple[Path, Problem, PlanResult],
 ) -> None:
-    _, problem, planned = example
-    result = followable(planned, problem.hand)
+    _, problem, result = example
     response = over_the_wire(response_of(result, 'palm', STAMP, record='run.mcap'))
     assert response.error_code == Response.NONE
     assert response.record == 'run.mcap'

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,6 +12,7 @@ from cfplan_ros.conversions.times import (
     nanoseconds_of,
     seconds_of,
     stamp_of,
+    whole_nanoseconds,
 )
 
 LAST = (2**31 - 1) * 10**9 + 999_999_999
@@ -40,3 +42,16 @@ def test_a_duration_splits_into_seconds_and_nanoseconds() -> None:
 def test_a_time_that_no_message_holds_is_refused(seconds: float) -> None:
     with pytest.raises(CfplanError, match=f'at most {LONGEST} s'):
         duration_message(seconds)
+
+
+@given(st.lists(st.floats(0.0, 1e-6), min_size=1, max_size=20))
+def test_rounded_times_increase_strictly(steps: list[float]) -> None:
+    times = np.cumsum(steps)
+    rounded = whole_nanoseconds(times)
+    assert (np.diff(rounded) >= 1).all()
+    assert (rounded >= np.rint(times * 1e9) - 1e-9).all()
+
+
+def test_a_plan_longer_than_a_message_can_say_is_refused() -> None:
+    with pytest.raises(CfplanError, match='2147483647 s'):
+        whole_nanoseconds(np.array([0.0, 3e9]))
