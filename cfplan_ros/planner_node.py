@@ -13,6 +13,7 @@ first waits for a signal, and the context is shut down last.
 
 from __future__ import annotations
 
+import copy
 import queue
 import signal
 import sys
@@ -57,7 +58,7 @@ from cfplan_ros.planning_service import (
 from cfplan_ros.preview_player import PreviewPlayer
 from cfplan_ros.recording.topics import ESSENTIAL, PREVIEW, REQUEST, RESPONSE
 from cfplan_ros.run_keeper import RunKeeper
-from cfplan_ros.visualization.preview import preview
+from cfplan_ros.visualization.preview import TRANSFORMS, preview
 
 NAME = 'cfplan_planner'
 
@@ -105,6 +106,7 @@ class PlannerNode(Node):
         }
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 1)
         self._planning: JobQueue[_Call] = JobQueue(self._serve, 'planning')
+        self._transforms: Any = None
         self._player = PreviewPlayer(self._publish, self._now, self._play_failed)
         self._keeper = RunKeeper(
             self.get_fully_qualified_name(),
@@ -122,6 +124,7 @@ class PlannerNode(Node):
         # Simulated time may stand still; whoever watches the node must hear of it all the same.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0, self._on_diagnostics, clock=steady)
+        self.create_timer(1.0, self._hold_pose, clock=steady)
 
     def stop(self) -> None:
         """Cancel what is being planned, have every request answered and every file closed.
@@ -223,6 +226,8 @@ class PlannerNode(Node):
 
     def _publish(self, topic: str, message: Any) -> None:
         self._outputs[topic.removeprefix('~/')].publish(message)
+        if topic == TRANSFORMS:
+            self._transforms = message
 
     def _tell(self, response: Any, capped: bool) -> None:
         """Log an answer and keep it for diagnostics."""
@@ -256,6 +261,15 @@ class PlannerNode(Node):
             f'playing {solved.problem_name!r}' if response.success else 'a plan is being played'
         )
         return response
+
+    def _hold_pose(self) -> None:
+        """Tell viewers again where links and object are: transforms go stale."""
+        if self._transforms is None or self._player.playing:
+            return
+        held = copy.deepcopy(self._transforms)
+        for transform in held.transforms:
+            transform.header.stamp = self.get_clock().now().to_msg()
+        self._outputs[TRANSFORMS].publish(held)
 
     def _play_failed(self, error: Exception) -> None:
         self.get_logger().error(f'playing ended: {error}')

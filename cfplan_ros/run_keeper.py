@@ -21,6 +21,7 @@ from cfplan_ros.parameters import Settings
 from cfplan_ros.planning_queue import Admission, JobQueue
 from cfplan_ros.planning_service import SCENE, pictures
 from cfplan_ros.recording.recorder import Recorder, Run
+from cfplan_ros.visualization.preview import TRANSFORMS
 
 # Planning must have rested for so long before viewers are shown a plan, s, but after so long it
 # is shown in any case, s.
@@ -136,7 +137,8 @@ class RunKeeper:
                 if picture is None:
                     break
                 due, topic, message = picture
-                if topic in SCENE:
+                at_start = due == nanoseconds_of(plan.header.stamp)
+                if topic in SCENE or (topic == TRANSFORMS and at_start):
                     self._publish(topic, message)
                 elif run is None or run.failure:
                     break

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pytest
 from cfplan_msgs.msg import JointTorqueLimits, ManipulationPlan
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
@@ -112,10 +114,28 @@ def test_plan_is_played_on_request_from_its_start_to_its_end(
     assert client.call(Trigger, 'play', Trigger.Request()).success
     played = [states.next() for _ in points]
     assert [state.position for state in played] == [point.positions for point in points]
-    for other in (poses, transforms, contacts, limits):
+    for other in (poses, contacts, limits):
         for _ in points:
             other.next()
+    last = _nanoseconds(played[-1].header.stamp)
+    transforms.until(lambda heard: _nanoseconds(heard.transforms[0].header.stamp) == last)
     assert states.empty
+
+
+def test_viewers_are_told_the_start_grasp_again_and_again(
+    planner: Planner, client: Client
+) -> None:
+    transforms = client.listen(TFMessage, '/tf')
+    client.plan(story_request())
+    first, second = transforms.next(), transforms.next()
+    assert first.transforms[0].header.stamp != second.transforms[0].header.stamp
+    start = story().start
+    for heard in (first, second):
+        links = {each.child_frame_id: each.transform for each in heard.transforms}
+        turn = links['left/link_1'].rotation
+        angle = 2.0 * math.atan2(turn.z, turn.w)
+        assert angle == pytest.approx(start.joints[0], abs=1e-8)
+        assert links['object'].translation.x == pytest.approx(start.object_pose[0], abs=1e-8)
 
 
 def test_speed_of_playing_is_that_of_the_parameter(start_planner: Start, client: Client) -> None:
