@@ -84,7 +84,7 @@ def test_eight_threads_of_one_process_get_each_their_own_answers_once(spawn, nod
         executor.shutdown(TIMEOUT)
         spinning.join(TIMEOUT)
     assert not spinning.is_alive()
-    assert right == {index: 250 for index in range(8)}
+    assert right == dict.fromkeys(range(8), 250)
     assert server.served() == [2000, 2000]
 
 

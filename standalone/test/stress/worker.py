@@ -7,6 +7,7 @@ both carry text: the first name of a request is its key, and the response repeat
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import sys
@@ -43,10 +44,8 @@ class Worker:
         threading.Thread(target=self._spin, daemon=True).start()
 
     def _spin(self) -> None:
-        try:
+        with contextlib.suppress(ExternalShutdownException):
             rclpy.spin(self.node)
-        except ExternalShutdownException:
-            pass
 
     # Services
 

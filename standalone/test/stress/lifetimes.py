@@ -1,0 +1,133 @@
+"""Another process of the stress tests: begins and ends rclpy many times; prints what that cost.
+
+The arguments are the name of a function of this module and the number of times. A hang ends it
+with the stacks of all threads.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import json
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.executors import (
+    Executor,
+    ExternalShutdownException,
+    MultiThreadedExecutor,
+    SingleThreadedExecutor,
+)
+from rclpy.node import Node
+from std_msgs.msg import Int64
+from std_srvs.srv import Trigger
+
+WAIT = 10.0
+HANG = 50.0
+WARM_UP = 10
+
+
+def busy_node(on_message: Callable[[Any], Any]) -> Node:
+    """A node with one of everything, that sends messages to itself."""
+    node = rclpy.create_node('busy')
+    publisher = node.create_publisher(Int64, 'numbers', 10)
+    node.create_subscription(Int64, 'numbers', on_message, 10)
+    node.create_timer(0.001, lambda: publisher.publish(Int64(data=1)))
+    node.create_service(Trigger, 'trigger', lambda _, response: response)
+    node.create_client(Trigger, 'trigger')
+    return node
+
+
+def used() -> dict[str, float]:
+    """Open descriptors, threads and memory [MB] of this process."""
+    pages = int(Path('/proc/self/statm').read_text().split()[1])
+    return {
+        'descriptors': len(os.listdir('/proc/self/fd')),
+        'threads': len(os.listdir('/proc/self/task')),
+        'memory': pages * os.sysconf('SC_PAGE_SIZE') / 1e6,
+    }
+
+
+def use_once() -> None:
+    arrived = threading.Event()
+    rclpy.init(args=[])
+    node = busy_node(lambda _: arrived.set())
+    while not arrived.is_set():
+        rclpy.spin_once(node, timeout_sec=WAIT)
+    rclpy.shutdown()
+
+
+def shut_down_a_context_that_a_thread_spins() -> None:
+    shut_down_while(rclpy.spin, rclpy.shutdown)
+
+
+def shut_down_a_context_that_a_pool_spins() -> None:
+    rclpy.init(args=[])
+    executor = MultiThreadedExecutor(4)
+    shut_down_while(executor_spin(executor), rclpy.shutdown)
+    assert executor.shutdown(WAIT)
+
+
+def shut_down_an_executor_that_a_thread_spins() -> None:
+    rclpy.init(args=[])
+    executor = SingleThreadedExecutor()
+    shut_down_while(executor_spin(executor), lambda: executor.shutdown(WAIT))
+    rclpy.shutdown()
+
+
+def shut_down_an_executor_that_a_pool_spins() -> None:
+    rclpy.init(args=[])
+    executor = MultiThreadedExecutor(4)
+    shut_down_while(executor_spin(executor), lambda: executor.shutdown(WAIT))
+    rclpy.shutdown()
+
+
+def executor_spin(executor: Executor) -> Callable[[Node], None]:
+    def spin(node: Node) -> None:
+        executor.add_node(node)
+        executor.spin()
+
+    return spin
+
+
+def shut_down_while(spin: Callable[[Node], None], shut_down: Callable[[], Any]) -> None:
+    if not rclpy.ok():
+        rclpy.init(args=[])
+    arrived = threading.Event()
+    node = busy_node(lambda _: arrived.set())
+
+    def spin_to_the_end() -> None:
+        with contextlib.suppress(ExternalShutdownException):
+            spin(node)
+
+    thread = threading.Thread(target=spin_to_the_end)
+    thread.start()
+    assert arrived.wait(WAIT)
+    shut_down()
+    thread.join(WAIT)
+    assert not thread.is_alive()
+
+
+def main() -> None:
+    faulthandler.dump_traceback_later(HANG, exit=True)
+    live, count = globals()[sys.argv[1]], int(sys.argv[2])
+    for _ in range(WARM_UP):
+        live()
+    before = used()
+    for _ in range(count):
+        live()
+    # A thread that was told to end may still be at it.
+    end = time.monotonic() + WAIT
+    while (after := used())['threads'] > before['threads'] and time.monotonic() < end:
+        time.sleep(0.01)
+    print(json.dumps([before, after]))
+
+
+if __name__ == '__main__':
+    main()
