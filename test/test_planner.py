@@ -392,6 +392,13 @@ def test_goal_in_part_is_reached(goal: Goal) -> None:
     certify(problem, plan(problem))
 
 
+def test_start_that_fulfils_a_goal_in_part_is_the_whole_plan() -> None:
+    problem = replace(pushed_block(), goal=Goal(contacts=('object.v0|palm.0.e2',)))
+    result = plan(problem)
+    certify(problem, result)
+    assert not np.ptp(result.joints, axis=0).any()
+
+
 def test_goal_in_part_that_nothing_fulfils_is_infeasible() -> None:
     """The left finger cannot touch the block's lower side, which is on the palm."""
     goal = Goal(contacts=('object.e0|left.link.v1',))

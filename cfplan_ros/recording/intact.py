@@ -27,7 +27,17 @@ _CONTENT = (
     Opcode.MESSAGE,
     Opcode.CHUNK,
 )
-_DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError)
+# What mcap and its decompressors raise for data that is no longer what was written.
+_DAMAGE = (
+    McapError,
+    CRCValidationError,
+    ZstdError,
+    struct.error,
+    ValueError,
+    OverflowError,
+    MemoryError,
+    RuntimeError,
+)
 
 
 class NotMcapError(CfplanError):

@@ -96,6 +96,9 @@ def recover_left_over(
             log(str(error))
         except OSError as error:
             log(f'not recovered: {failure_reason(error, path)}')
+        # One file, whatever it holds, must not cost the others.
+        except Exception as error:
+            log(f'{path}: not recovered: {type(error).__name__}: {error}')
     return completed
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from mcap.reader import make_reader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 from ros.recording.example import STAMP, example, not_solved, recorder
 
 from cfplan_core.errors import CfplanError
@@ -21,6 +21,7 @@ from cfplan_ros.planning_service import pictures
 from cfplan_ros.recording.intact import NotMcapError
 from cfplan_ros.recording.reading import read_messages, read_run
 from cfplan_ros.recording.recovery import InUseError, recover, recover_left_over
+from cfplan_ros.recording.rewriting import rewrite
 
 GOLDEN = Path(__file__).parents[1] / 'golden' / 'rosbag2_jazzy.mcap'
 Messages = list[tuple[str, int, Any]]
@@ -176,6 +177,35 @@ def test_damaged_chunk_is_left_out_and_the_rest_kept(
     assert (tmp_path / f'{whole.name}.unreadable').read_bytes() == data
 
 
+def test_damage_to_the_length_of_a_chunk_is_left_out(whole: Path, tmp_path: Path) -> None:
+    path = _torn(whole, whole.stat().st_size, tmp_path)
+    data = bytearray(path.read_bytes())
+    # The chunk's compression, then eight bytes with the length of its records.
+    length = data.index(b'zstd') + len(b'zstd')
+    data[length : length + 8] = b'\xff' * 8
+    path.write_bytes(data)
+    assert recover(path).problems[0] == '1 chunk(s) left out that fail their checksum'
+
+
+def test_damaged_chunk_of_another_compression_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / 'other.mcap'
+    with path.open('wb') as file:
+        writer = Writer(file, compression=CompressionType.LZ4)
+        writer.start()
+        channel = writer.register_channel('/words', 'json', 0)
+        for time in range(2):
+            writer.add_message(channel, time, b'word' * 100, time)
+            writer.flush()
+        writer.finish()
+    data = bytearray(path.read_bytes())
+    # The second chunk's records: its compression, then eight bytes with their length.
+    start = data.index(b'lz4', data.index(b'lz4') + 1) + len(b'lz4') + 8
+    data[start : start + 8] = bytes(8)
+    path.write_bytes(data[:-100])
+    result = recover(path)
+    assert result.problems == ('1 chunk(s) left out that fail their checksum',)
+
+
 def test_other_recordings_are_recovered_beside_the_torn_file(tmp_path: Path) -> None:
     torn = tmp_path / 'x.mcap'
     data = GOLDEN.read_bytes()
@@ -307,6 +337,24 @@ def test_file_of_which_nothing_can_be_read_is_set_aside_once(tmp_path: Path) -> 
     assert recover_left_over(tmp_path, pictures, lines.append) == []
     assert len(lines) == 1
     assert (tmp_path / 'run_1.mcap.unreadable').read_bytes() == b'\x89MCAP0\r\n garbage'
+
+
+def test_file_that_recovery_fails_on_does_not_cost_the_others(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ('run_1', 'run_2'):
+        (tmp_path / f'{name}.mcap.part').write_bytes(whole.read_bytes())
+    once = iter([KeyError('a defect')])
+
+    def fail_once(*arguments: Any) -> None:
+        for error in once:
+            raise error
+        rewrite(*arguments)
+
+    monkeypatch.setattr('cfplan_ros.recording.recovery.rewrite', fail_once)
+    log: list[str] = []
+    assert recover_left_over(tmp_path, None, log.append) == [tmp_path / 'run_2.mcap']
+    assert log[0].endswith("run_1.mcap.part: not recovered: KeyError: 'a defect'")
 
 
 def test_files_of_others_are_not_touched(tmp_path: Path) -> None:
