@@ -59,6 +59,7 @@ setup(
             'psutil>=5.9',
             'pytest>=7.4',
             'pytest-benchmark>=4.0',
+            'pytest-xdist>=3.5',
             'rosbags>=0.10',
         ],
         'lint': ['mypy>=1.11', 'ruff>=0.6', 'scipy-stubs', 'types-jsonschema', 'types-PyYAML'],
