@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from cfplan_core.contact.system import ContactSystem
-from cfplan_core.errors import CfplanError
+from cfplan_core.errors import CfplanError, Finding
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Problem
+from cfplan_core.planning.bounds import NEEDED_FORCE, NeededForceBound
+from cfplan_core.planning.constraints import CROWDED, FORBIDDEN, UNCONSTRAINED, Constraints
 from cfplan_core.planning.goal_test import GoalTest
-from cfplan_core.planning.grasp_check import examine_problem
+from cfplan_core.planning.grasp_check import ExaminedProblem, examine_problem
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.search import Search, Tree
-from cfplan_core.trajectory.frames import Frames, build_frames, overloaded_legs
+from cfplan_core.trajectory.frames import Frames, build_frames, overloaded_legs, strained_legs
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
 
 
@@ -28,16 +31,22 @@ class PlanOptions:
     Attributes:
         time_budget: Seconds, or None for no limit.
         max_nodes: Nodes of both trees together, or None for no limit.
+        max_needed_force: Largest force, in weights of the object, that the contacts may need to
+            hold it in any frame of the plan, or None for no limit.
     """
 
     time_budget: float | None = None
     max_nodes: int | None = None
+    max_needed_force: float | None = None
 
     def __post_init__(self) -> None:
         if self.time_budget is not None and not self.time_budget > 0.0:
             raise CfplanError(f'time_budget: got {self.time_budget}, expected seconds above zero')
         if self.max_nodes is not None and not self.max_nodes > 0:
             raise CfplanError(f'max_nodes: got {self.max_nodes}, expected a number above zero')
+        force = self.max_needed_force
+        if force is not None and not (math.isfinite(force) and force > 0.0):
+            raise CfplanError(f'max_needed_force: got {force}, expected weights above zero')
 
 
 @dataclass(frozen=True)
@@ -100,13 +109,15 @@ class _Planning:
         self.began = time.perf_counter()
         self.system = ContactSystem(problem)
         self.model = FrictionlessModel(self.system.load)
-        self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
+        self.constraints = self._constraints()
+        self.roadmap = Roadmap(self.system, self.model, self._checkpoint, self.constraints)
         self.search: Search | None = None
 
     def run(self) -> PlanResult:
         examined = examine_problem(self.system, self.model)
-        if examined.findings:
-            message = '\n'.join(str(finding) for finding in examined.findings)
+        findings = examined.findings or self._contradictions(examined)
+        if findings:
+            message = '\n'.join(str(finding) for finding in findings)
             return self._answer(Status.INVALID, message)
         goal: FloatArray | GoalTest
         try:
@@ -132,6 +143,26 @@ class _Planning:
             segments=frames.segments,
         )
 
+    def _constraints(self) -> Constraints:
+        """Compile what the options ask of every configuration."""
+        options = self.options
+        if options.max_needed_force is None:
+            return UNCONSTRAINED
+        return Constraints((NeededForceBound(self.model, options.max_needed_force),))
+
+    def _contradictions(self, examined: ExaminedProblem) -> tuple[Finding, ...]:
+        """How start and goal contradict the constraints."""
+        grasps = [('start', examined.start)]
+        if examined.goal is not None:
+            grasps.append(('goal', examined.goal))
+        return tuple(
+            finding
+            for field, grasp in grasps
+            for finding in self.constraints.findings(
+                self.system, grasp.z, grasp.pairs, field, '<problem>'
+            )
+        )
+
     def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> Frames | None:
         """Search until a path is found that the joints' efforts can hold.
 
@@ -146,6 +177,11 @@ class _Planning:
                 return None
             legs = self.search.path()
             too_weak = overloaded_legs(self.system, self.model, legs)
+            why = 'a joint would exceed its effort limit'
+            largest = self.options.max_needed_force
+            if not too_weak and largest is not None:
+                too_weak = strained_legs(self.system, self.model, legs, largest)
+                why = NEEDED_FORCE
             if not too_weak:
                 return build_frames(self.system, self.model, legs)
             for index in too_weak:
@@ -160,7 +196,7 @@ class _Planning:
                         self.roadmap.regions.drop(piece, z)
                 else:
                     blocked |= {piece.index}
-            self.roadmap.failures['a joint would exceed its effort limit'] += len(too_weak)
+            self.roadmap.failures[why] += len(too_weak)
 
     def _checkpoint(self) -> None:
         """Stop the search when it has to."""
@@ -194,6 +230,10 @@ class _Planning:
         doubt = ''
         if blocked:
             doubt += f'. Left out, as a joint would exceed its effort limit: {blocked} pieces'
+        for why in (NEEDED_FORCE, CROWDED, FORBIDDEN):
+            count = sum(n for reason, n in self.roadmap.failures.items() if reason.endswith(why))
+            if count:
+                doubt += f'. Not followed, as {why}: {count} ways'
         if not regions:
             return doubt
         return doubt + (

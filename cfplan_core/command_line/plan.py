@@ -49,6 +49,13 @@ def finite_seconds(
     return value
 
 
+def weights(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    """Accept an option's number of weights of the object if contacts can press that hard."""
+    if value is not None and not (math.isfinite(value) and value > 0.0):
+        raise click.BadParameter(f'{value} is not a finite number of weights above zero.')
+    return value
+
+
 @click.command(short_help='Search for a plan.')
 @click.argument('file', type=click.Path(path_type=Path))
 @click.option(
@@ -78,26 +85,37 @@ def finite_seconds(
     metavar='N',
     help='Give up once the two trees have N nodes or more together.',
 )
+@click.option(
+    '--max-needed-force',
+    type=float,
+    callback=weights,
+    metavar='F',
+    help='Nowhere may the contacts need more than F weights of the object to hold it.',
+)
 def plan(
     file: Path,
     json_path: Path | None,
     figure_directory: Path | None,
     time_budget: float | None,
     max_nodes: int | None,
+    max_needed_force: float | None,
 ) -> int:
     """Search for a plan that solves the problem FILE, and print it as tables.
 
     Exit status: 0 solved, 1 infeasible (searched to the end), 2 invalid input or usage, 3 budget
     exhausted, 130 interrupted.
     """
+    from cfplan_core.planner import PlanOptions
+
     for directory in (json_path.parent if json_path else None, figure_directory):
         if directory is not None:
             directory.mkdir(parents=True, exist_ok=True)
 
+    options = PlanOptions(time_budget, max_nodes, max_needed_force)
     examined = examine(file)
     try:
         problem = examined.valid_problem()
-        result, interrupted = _search(problem, time_budget, max_nodes)
+        result, interrupted = _search(problem, options)
     except InvalidProblemError as error:
         print_findings(error.findings, complaints())
         if json_path is not None:
@@ -119,14 +137,10 @@ def plan(
     return EXIT_STATUS[result.status]
 
 
-def _search(
-    problem: Problem, time_budget: float | None, max_nodes: int | None
-) -> tuple[PlanResult, bool]:
+def _search(problem: Problem, options: PlanOptions) -> tuple[PlanResult, bool]:
     """Plan with progress shown; return the result and whether Ctrl-C ended the search."""
-    from cfplan_core.planner import PlanOptions
     from cfplan_core.planner import plan as search
 
-    options = PlanOptions(time_budget=time_budget, max_nodes=max_nodes)
     with progress_bar() as bar, _interrupt() as cancel:
         progress = None if bar is None else _shown_on(bar, options)
         result = search(problem, options, progress=progress, cancel=cancel)

@@ -76,7 +76,7 @@ def _segment_table(result: PlanResult) -> Table:
     table = _new_table()
     table.add_column('No.', justify='right')
     table.add_column('Contacts', overflow='fold')
-    table.add_column('Stability')
+    table.add_column('Stability,\nneeded force')
     table.add_column('Frames', justify='right')
     table.add_column('Time (s)', justify='right')
     for k, segment in enumerate(result.segments):
@@ -84,12 +84,16 @@ def _segment_table(result: PlanResult) -> Table:
         table.add_row(
             str(k + 1),
             Text('\n'.join(segment.contacts)),
-            segment.stability.replace('_', ' '),
+            segment.stability.replace('_', ' ') + _needed(segment.needed_force),
             f'{segment.first_frame} to {segment.last_frame}',
             f'{start:.2f} to {end:.2f}\n({end - start:.2f})',
             end_section=True,
         )
     return table
+
+
+def _needed(force: float | None) -> str:
+    return '' if force is None else f'\n{force:.2f} weights'
 
 
 def _joint_table(result: PlanResult, problem: Problem | None) -> Table:

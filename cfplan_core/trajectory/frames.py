@@ -54,6 +54,19 @@ def overloaded_legs(system: ContactSystem, model: ContactModel, legs: Sequence[L
     return overloaded
 
 
+def strained_legs(
+    system: ContactSystem, model: ContactModel, legs: Sequence[Leg], largest: float
+) -> list[int]:
+    """Tell which legs have frames that need a larger force, in weights, by index."""
+    strained = []
+    for index, leg in enumerate(legs):
+        placed = system.place(_evenly(system, leg))
+        gradients = gap_gradients(system, placed, leg.formation.array)
+        if not (model.needed_forces(gradients) <= largest).all():
+            strained.append(index)
+    return strained
+
+
 def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> Frames:
     """Sample a path into frames.
 
@@ -73,9 +86,12 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
     first = 0
     for leg in legs:
         for stability, z in _parts(tracer, leg, _evenly(system, leg)):
-            low, high = _torque_limits(system, model, leg, z)
+            gradients = gap_gradients(system, system.place(z), leg.formation.array)
+            low, high = _torque_limits(system, model, gradients, z)
             contacts = system.contact_names(leg.formation.pairs)
-            segments.append(Segment(contacts, stability.value, first, first + len(z) - 1))
+            needed = float(model.needed_forces(gradients).max())
+            last = first + len(z) - 1
+            segments.append(Segment(contacts, stability.value, first, last, needed))
             shared = 1 if points else 0
             points.append(z[shared:])
             lower.append(low[shared:])
@@ -141,10 +157,9 @@ def _middles(system: ContactSystem, leg: Leg, before: FloatArray, after: FloatAr
 
 
 def _torque_limits(
-    system: ContactSystem, model: ContactModel, leg: Leg, z: FloatArray
+    system: ContactSystem, model: ContactModel, gradients: FloatArray, z: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Actuator torques that keep a leg's contacts, in N·m, each of shape (s, n)."""
-    gradients = gap_gradients(system, system.place(z), leg.formation.array)
+    """Actuator torques that keep the contacts, in N·m, each of shape (s, n)."""
     lower, upper = model.torque_limits(gradients)
     weight = system.link_weight_torques(z)
     unit = system.force_unit * system.size

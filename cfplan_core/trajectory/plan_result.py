@@ -29,12 +29,15 @@ class Segment:
         stability: ``form_closure``, ``force_closure`` or ``second_order``.
         first_frame: Index of the first frame; shared with the segment before.
         last_frame: Index of the last frame; shared with the segment after.
+        needed_force: Largest over its frames of the smallest F such that contact forces of at
+            most F hold the object, in weights of the object; None if not known.
     """
 
     contacts: tuple[str, ...]
     stability: str
     first_frame: int
     last_frame: int
+    needed_force: float | None = None
 
 
 @dataclass(frozen=True)
@@ -115,3 +118,10 @@ class PlanResult:
     def solved(self) -> bool:
         """True if there is a plan."""
         return self.status is Status.SOLVED
+
+    @property
+    def needed_force(self) -> float | None:
+        """Largest needed force of the plan, in weights of the object; None if not known."""
+        forces = [segment.needed_force for segment in self.segments]
+        known = [force for force in forces if force is not None]
+        return max(known) if known and len(known) == len(forces) else None
