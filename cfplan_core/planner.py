@@ -141,6 +141,9 @@ class _Planning:
             torque_lower=frames.torque_lower,
             torque_upper=frames.torque_upper,
             segments=frames.segments,
+            reversible=self.model.reversible,
+            entry_lower=frames.entry_lower,
+            entry_upper=frames.entry_upper,
         )
 
     def _constraints(self) -> Constraints:

@@ -39,6 +39,8 @@ class Frames:
     torque_lower: FloatArray
     torque_upper: FloatArray
     segments: tuple[Segment, ...]
+    entry_lower: FloatArray
+    entry_upper: FloatArray
 
 
 def overloaded_legs(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> list[int]:
@@ -83,6 +85,8 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
     lower: list[FloatArray] = []
     upper: list[FloatArray] = []
     segments: list[Segment] = []
+    entry_lower: list[FloatArray] = []
+    entry_upper: list[FloatArray] = []
     first = 0
     for leg in legs:
         for stability, z in _parts(tracer, leg, _evenly(system, leg)):
@@ -92,6 +96,8 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
             needed = float(model.needed_forces(gradients).max())
             last = first + len(z) - 1
             segments.append(Segment(contacts, stability.value, first, last, needed))
+            entry_lower.append(low[0])
+            entry_upper.append(high[0])
             shared = 1 if points else 0
             points.append(z[shared:])
             lower.append(low[shared:])
@@ -105,6 +111,8 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
         np.concatenate(lower),
         np.concatenate(upper),
         tuple(segments),
+        np.array(entry_lower),
+        np.array(entry_upper),
     )
 
 

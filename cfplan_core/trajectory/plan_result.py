@@ -99,6 +99,10 @@ class PlanResult:
         segments: Cover all frames; neighbours share a frame.
         statistics: What the search did.
         trees: The two CF-trees, (initial, goal); parents come before children.
+        reversible: True if it is known that the plan can be followed backwards.
+        entry_lower: Shape (s, n), torque limits of each segment at its first frame, N·m, where
+            the frame itself carries those of the segment before. Not in plan files.
+        entry_upper: As `entry_lower`.
     """
 
     problem: str
@@ -113,11 +117,28 @@ class PlanResult:
     segments: tuple[Segment, ...] = ()
     statistics: Statistics = field(default_factory=Statistics)
     trees: tuple[tuple[TreeNode, ...], tuple[TreeNode, ...]] = ((), ())
+    reversible: bool = False
+    entry_lower: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    entry_upper: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def solved(self) -> bool:
         """True if there is a plan."""
         return self.status is Status.SOLVED
+
+    def reversed(self) -> PlanResult:
+        """Return the plan from the goal to the start.
+
+        Each segment's contacts, torque limits and speed are as before, in reverse order; the name
+        stays that of the problem, whose start and goal have changed places.
+
+        Raises:
+            CfplanError: It is not solved, or not known to be reversible: its contact model is
+                not, or it was read from a file.
+        """
+        from cfplan_core.trajectory.reversal import reversed_plan
+
+        return reversed_plan(self)
 
     @property
     def needed_force(self) -> float | None:
