@@ -2,51 +2,27 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from cfplan_core.contact.held import HeldSystem
 from cfplan_core.contact.system import ContactSystem
-from cfplan_core.errors import CfplanError, Finding
+from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.frictionless import FrictionlessModel
-from cfplan_core.model import Problem
-from cfplan_core.planning.bounds import NEEDED_FORCE, NeededForceBound
-from cfplan_core.planning.constraints import CROWDED, FORBIDDEN, UNCONSTRAINED, Constraints
+from cfplan_core.model import Goal, Problem
+from cfplan_core.options import PlanOptions as PlanOptions
+from cfplan_core.planning.constraints import REASONS, compile_constraints, contradictions
 from cfplan_core.planning.goal_test import GoalTest
-from cfplan_core.planning.grasp_check import ExaminedProblem, examine_problem
+from cfplan_core.planning.grasp_check import ExaminedGrasp, examine_problem
+from cfplan_core.planning.manifold import settle
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
-from cfplan_core.planning.search import Search, Tree
-from cfplan_core.trajectory.frames import Frames, build_frames, overloaded_legs, strained_legs
+from cfplan_core.planning.search import Leg, Search, Tree
+from cfplan_core.trajectory.frames import Frames, build_frames, overloaded_legs, straying_legs
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
-
-
-@dataclass(frozen=True)
-class PlanOptions:
-    """Limits of a search.
-
-    Attributes:
-        time_budget: Seconds, or None for no limit.
-        max_nodes: Nodes of both trees together, or None for no limit.
-        max_needed_force: Largest force, in weights of the object, that the contacts may need to
-            hold it in any frame of the plan, or None for no limit.
-    """
-
-    time_budget: float | None = None
-    max_nodes: int | None = None
-    max_needed_force: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.time_budget is not None and not self.time_budget > 0.0:
-            raise CfplanError(f'time_budget: got {self.time_budget}, expected seconds above zero')
-        if self.max_nodes is not None and not self.max_nodes > 0:
-            raise CfplanError(f'max_nodes: got {self.max_nodes}, expected a number above zero')
-        force = self.max_needed_force
-        if force is not None and not (math.isfinite(force) and force > 0.0):
-            raise CfplanError(f'max_needed_force: got {force}, expected weights above zero')
 
 
 @dataclass(frozen=True)
@@ -64,6 +40,9 @@ class Progress:
     nodes: tuple[int, int]
     formations: int
     message: str
+
+
+TOO_WEAK = 'a joint would exceed its effort limit'
 
 
 class _BudgetExhaustedError(Exception):
@@ -108,27 +87,38 @@ class _Planning:
         self.cancel = cancel
         self.began = time.perf_counter()
         self.system = ContactSystem(problem)
+        self.moving = self.system
         self.model = FrictionlessModel(self.system.load)
-        self.constraints = self._constraints()
-        self.roadmap = Roadmap(self.system, self.model, self._checkpoint, self.constraints)
+        self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
         self.search: Search | None = None
 
     def run(self) -> PlanResult:
         examined = examine_problem(self.system, self.model)
-        findings = examined.findings or self._contradictions(examined)
+        try:
+            constraints = compile_constraints(self.system, self.model, self.options)
+        except CfplanError as error:
+            return self._answer(Status.INVALID, f'options: {error}')
+        findings = examined.findings or contradictions(
+            constraints, self.system, examined, self.problem.goal, self.options.held_joints
+        )
         if findings:
             message = '\n'.join(str(finding) for finding in findings)
             return self._answer(Status.INVALID, message)
+        start = examined.start.z
+        if self.options.held_joints:
+            self.moving = HeldSystem(self.system, self.options.held_joints, start)
+            start = self.moving.reduced(start)
+        self.roadmap = Roadmap(self.moving, self.model, self._checkpoint, constraints)
         goal: FloatArray | GoalTest
         try:
             if examined.goal is not None:
-                goal = examined.goal.z
+                goal = self._moving_goal(examined.goal)
             else:
-                goal = GoalTest(self.system, self.problem.goal)
+                goal = GoalTest(self.moving, self._free_goal())
         except CfplanError as error:
             return self._answer(Status.INVALID, f'goal: {error}')
         try:
-            frames = self._search(examined.start.z, goal)
+            frames = self._search(start, goal)
         except _BudgetExhaustedError as stop:
             return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
         if frames is None:
@@ -146,25 +136,25 @@ class _Planning:
             entry_upper=frames.entry_upper,
         )
 
-    def _constraints(self) -> Constraints:
-        """Compile what the options ask of every configuration."""
-        options = self.options
-        if options.max_needed_force is None:
-            return UNCONSTRAINED
-        return Constraints((NeededForceBound(self.model, options.max_needed_force),))
+    def _moving_goal(self, goal: ExaminedGrasp) -> FloatArray:
+        """The goal grasp in the coordinates that move, exactly on its contacts."""
+        if isinstance(self.moving, HeldSystem):
+            return settle(self.moving, self.moving.reduced(goal.z), goal.pairs)
+        return goal.z
 
-    def _contradictions(self, examined: ExaminedProblem) -> tuple[Finding, ...]:
-        """How start and goal contradict the constraints."""
-        grasps = [('start', examined.start)]
-        if examined.goal is not None:
-            grasps.append(('goal', examined.goal))
-        return tuple(
-            finding
-            for field, grasp in grasps
-            for finding in self.constraints.findings(
-                self.system, grasp.z, grasp.pairs, field, '<problem>'
-            )
-        )
+    def _free_goal(self) -> Goal:
+        """The goal without the angles of held joints, which agree with the start's."""
+        goal, held = self.problem.goal, self.options.held_joints
+        if not held or goal.joints is None:
+            return goal
+        joints = {name: angle for name, angle in goal.joints.items() if name not in held}
+        return replace(goal, joints=joints)
+
+    def _whole(self, legs: Sequence[Leg]) -> list[Leg]:
+        """Legs in the coordinates of all joints."""
+        if isinstance(self.moving, HeldSystem):
+            return [replace(leg, points=self.moving.expanded(leg.points)) for leg in legs]
+        return list(legs)
 
     def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> Frames | None:
         """Search until a path is found that the joints' efforts can hold.
@@ -179,15 +169,12 @@ class _Planning:
             if not self.search.run():
                 return None
             legs = self.search.path()
-            too_weak = overloaded_legs(self.system, self.model, legs)
-            why = 'a joint would exceed its effort limit'
-            largest = self.options.max_needed_force
-            if not too_weak and largest is not None:
-                too_weak = strained_legs(self.system, self.model, legs, largest)
-                why = NEEDED_FORCE
-            if not too_weak:
-                return build_frames(self.system, self.model, legs)
-            for index in too_weak:
+            whole = self._whole(legs)
+            refused = dict.fromkeys(overloaded_legs(self.system, self.model, whole), TOO_WEAK)
+            refused |= straying_legs(self.system, whole, self.roadmap.constraints.bounds)
+            if not refused:
+                return build_frames(self.system, self.model, whole)
+            for index in refused:
                 leg = legs[index]
                 piece = self.roadmap.pieces[leg.piece]
                 # The first leg begins at the start, the last one ends at the goal.
@@ -199,7 +186,7 @@ class _Planning:
                         self.roadmap.regions.drop(piece, z)
                 else:
                     blocked |= {piece.index}
-            self.roadmap.failures[why] += len(too_weak)
+            self.roadmap.failures.update(refused.values())
 
     def _checkpoint(self) -> None:
         """Stop the search when it has to."""
@@ -229,11 +216,11 @@ class _Planning:
     def _doubt(self) -> str:
         """How far an answer of no path is short of a proof."""
         regions = sum(piece.dimension > 1 for piece in self.roadmap.pieces)
-        blocked = self.roadmap.failures['a joint would exceed its effort limit']
+        blocked = self.roadmap.failures[TOO_WEAK]
         doubt = ''
         if blocked:
             doubt += f'. Left out, as a joint would exceed its effort limit: {blocked} pieces'
-        for why in (NEEDED_FORCE, CROWDED, FORBIDDEN):
+        for why in REASONS:
             count = sum(n for reason, n in self.roadmap.failures.items() if reason.endswith(why))
             if count:
                 doubt += f'. Not followed, as {why}: {count} ways'

@@ -10,9 +10,11 @@ from typing import Protocol
 
 import numpy as np
 
+from cfplan_core.contact.system import ContactSystem, as_complex
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel
 
+OUTSIDE = 'the object would leave its region'
 NEEDED_FORCE = 'contacts would need more than the largest force'
 
 
@@ -41,6 +43,39 @@ class Bound(Protocol):
             z: Shape (1, 3 + n).
             gradients: Shape (1, k, 3 + n).
         """
+
+
+class RegionBound:
+    """The object stays inside a convex polygon."""
+
+    def __init__(self, system: ContactSystem, polygon: FloatArray) -> None:
+        """Bound where the object is.
+
+        Args:
+            system: Compiled problem.
+            polygon: Shape (k, 2), m, convex, counter-clockwise.
+        """
+        body = system.problem.object
+        self._outline = as_complex(body.vertices - body.center_of_mass) / system.size
+        corners = as_complex(polygon) / system.size
+        edges = np.roll(corners, -1) - corners
+        # i times an edge points inside.
+        self._inward = (1j * edges / np.abs(edges)).conj()
+        self._corners = corners
+        self._size = system.size
+        self.reason = OUTSIDE
+
+    def margins(self, z: FloatArray, gradients: FloatArray) -> FloatArray:
+        """Distance of the object from the nearest side, in object sizes; shape (s,)."""
+        center = z[:, 0] + 1j * z[:, 1]
+        points = center[:, None] + np.exp(1j * z[:, 2:3]) * self._outline
+        inside = (self._inward * (points[..., None] - self._corners)).real
+        return np.asarray(inside.min(axis=(1, 2)))
+
+    def finding(self, z: FloatArray, gradients: FloatArray) -> tuple[str, str]:
+        """Say how far a grasp's object is outside."""
+        out = -float(self.margins(z, gradients)[0]) * self._size
+        return f'an object {out:.3g} m outside the region', 'an object inside it'
 
 
 class NeededForceBound:

@@ -7,7 +7,7 @@ that no search over it can pass by.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +15,20 @@ import numpy as np
 from cfplan_core.contact.elements import parse_contact
 from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray
-from cfplan_core.errors import Finding
+from cfplan_core.errors import CfplanError, Finding
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.planning.bounds import Bound
+from cfplan_core.mechanics.contact_model import ContactModel
+from cfplan_core.model import Goal
+from cfplan_core.options import PlanOptions
+from cfplan_core.planning.bounds import NEEDED_FORCE, OUTSIDE, Bound, NeededForceBound, RegionBound
+from cfplan_core.planning.grasp_check import ExaminedProblem
 
+_FILE = '<problem>'
+# Angles that differ by less, in rad, are the same but for rounding.
+_HELD = 1e-6
 FORBIDDEN = 'a forbidden contact formation would touch'
 CROWDED = 'more contacts than allowed would touch'
+REASONS = (NEEDED_FORCE, OUTSIDE, FORBIDDEN, CROWDED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +106,69 @@ def contact_number(together: BoolArray) -> int:
     return int((~crowded).sum()) + 2 * len(places)
 
 
-def formation_pairs(system: ContactSystem, names: Sequence[str]) -> frozenset[int]:
+def formation_pairs(system: ContactSystem, field: str, names: Sequence[str]) -> frozenset[int]:
     """Pairs of a contact formation given by the names of its contacts.
 
     Raises:
         CfplanError: A name is malformed or is of no possible contact.
     """
-    return frozenset(system.pair(parse_contact(name)) for name in names)
+    try:
+        return frozenset(system.pair(parse_contact(name)) for name in names)
+    except CfplanError as error:
+        raise CfplanError(f'{field}: {error}') from None
+
+
+def compile_constraints(
+    system: ContactSystem, model: ContactModel, options: PlanOptions
+) -> Constraints:
+    """Compile what options ask of every configuration.
+
+    Raises:
+        CfplanError: An option names a contact or a joint that the problem does not have.
+    """
+    for name in options.held_joints:
+        if name not in system.joint_names:
+            known = ', '.join(system.joint_names)
+            raise CfplanError(f'held_joints: got {name!r}, expected names of {known}')
+    bounds: list[Bound] = []
+    if options.max_needed_force is not None:
+        bounds.append(NeededForceBound(model, options.max_needed_force))
+    if options.stay_within is not None:
+        bounds.append(RegionBound(system, np.array(options.stay_within, dtype=float)))
+    return Constraints(
+        tuple(bounds),
+        options.max_contacts,
+        tuple(formation_pairs(system, 'forbidden', names) for names in options.forbidden),
+        tuple(formation_pairs(system, 'required', names) for names in options.required),
+    )
+
+
+def contradictions(
+    constraints: Constraints,
+    system: ContactSystem,
+    examined: ExaminedProblem,
+    goal: Goal,
+    held: Collection[str],
+) -> tuple[Finding, ...]:
+    """Find out how start and goal contradict what is asked.
+
+    Args:
+        constraints: Compiled.
+        system: With all joints.
+        examined: Start and goal.
+        goal: As the problem gives it.
+        held: Names of joints that do not move.
+    """
+    findings = []
+    for field, grasp in (('start', examined.start), ('goal', examined.goal)):
+        if grasp is not None:
+            findings += constraints.findings(system, grasp.z, grasp.pairs, field, _FILE)
+    for name in held:
+        angle = float(examined.start.z[3 + system.joint_names.index(name)])
+        wanted = (goal.joints or {}).get(name, angle)
+        if abs(wanted - angle) > _HELD:
+            value = f'{wanted:.9g} rad of a joint that is held'
+            findings.append(
+                Finding(_FILE, f'goal.joints.{name}', value, f'{angle:.9g} rad, as at the start')
+            )
+    return tuple(findings)

@@ -11,6 +11,7 @@ from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
+from cfplan_core.planning.bounds import Bound
 from cfplan_core.planning.manifold import independent_rows, project
 from cfplan_core.planning.search import Leg
 from cfplan_core.planning.stability_classes import split_by_class
@@ -56,17 +57,18 @@ def overloaded_legs(system: ContactSystem, model: ContactModel, legs: Sequence[L
     return overloaded
 
 
-def strained_legs(
-    system: ContactSystem, model: ContactModel, legs: Sequence[Leg], largest: float
-) -> list[int]:
-    """Tell which legs have frames that need a larger force, in weights, by index."""
-    strained = []
-    for index, leg in enumerate(legs):
-        placed = system.place(_evenly(system, leg))
-        gradients = gap_gradients(system, placed, leg.formation.array)
-        if not (model.needed_forces(gradients) <= largest).all():
-            strained.append(index)
-    return strained
+def straying_legs(
+    system: ContactSystem, legs: Sequence[Leg], bounds: Sequence[Bound]
+) -> dict[int, str]:
+    """Tell which legs have frames beyond a bound: their indices, each with the bound's reason."""
+    straying: dict[int, str] = {}
+    for index, leg in enumerate(legs if bounds else ()):
+        z = _evenly(system, leg)
+        gradients = gap_gradients(system, system.place(z), leg.formation.array)
+        for bound in bounds:
+            if not (bound.margins(z, gradients) >= 0.0).all():
+                straying.setdefault(index, bound.reason)
+    return straying
 
 
 def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> Frames:
