@@ -53,6 +53,12 @@ class PlanOptions:
     prefer: Preference = Preference.FIRST
     alternatives: int = 1
 
+    @property
+    def optimal(self) -> bool:
+        """True if the first plan found is not enough."""
+        chosen = self.prefer is not Preference.FIRST
+        return chosen or self.alternatives > 1 or bool(self.required)
+
     def __post_init__(self) -> None:
         if self.time_budget is not None and not self.time_budget > 0.0:
             raise CfplanError(f'time_budget: got {self.time_budget}, expected seconds above zero')

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.held import HeldSystem
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.errors import CfplanError
@@ -14,14 +15,17 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Goal, Problem
 from cfplan_core.options import PlanOptions as PlanOptions
+from cfplan_core.options import Preference
+from cfplan_core.planning.best_first import BestFirst, Label
 from cfplan_core.planning.constraints import REASONS, compile_constraints, contradictions
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.grasp_check import ExaminedGrasp, examine_problem
 from cfplan_core.planning.manifold import settle
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
+from cfplan_core.planning.robustness import Robustness
 from cfplan_core.planning.search import Leg, Search, Tree
-from cfplan_core.trajectory.frames import Frames, build_frames, overloaded_legs, straying_legs
+from cfplan_core.trajectory.frames import build_frames, overloaded_legs, straying_legs
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
 
 
@@ -90,7 +94,7 @@ class _Planning:
         self.moving = self.system
         self.model = FrictionlessModel(self.system.load)
         self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
-        self.search: Search | None = None
+        self.search: Search | BestFirst | None = None
 
     def run(self) -> PlanResult:
         examined = examine_problem(self.system, self.model)
@@ -118,13 +122,24 @@ class _Planning:
         except CfplanError as error:
             return self._answer(Status.INVALID, f'goal: {error}')
         try:
-            frames = self._search(start, goal)
+            if self.options.optimal:
+                best = self._search_best(start, goal)
+                if best is not None:
+                    return best
+                legs = None
+            else:
+                legs = self._search(start, goal)
         except _BudgetExhaustedError as stop:
             return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
-        if frames is None:
+        if legs is None:
             return self._answer(Status.INFEASIBLE, f'no path; {self._explored()}{self._doubt()}')
+        return self._solved(self._whole(legs), '')
+
+    def _solved(self, legs: Sequence[Leg], message: str) -> PlanResult:
+        """The answer for a path, with the trees of the search that found it."""
+        frames = build_frames(self.system, self.model, legs)
         return replace(
-            self._answer(Status.SOLVED, ''),
+            self._answer(Status.SOLVED, message),
             times=frames.times,
             joints=frames.joints,
             object_poses=frames.object_poses,
@@ -152,11 +167,91 @@ class _Planning:
 
     def _whole(self, legs: Sequence[Leg]) -> list[Leg]:
         """Legs in the coordinates of all joints."""
-        if isinstance(self.moving, HeldSystem):
-            return [replace(leg, points=self.moving.expanded(leg.points)) for leg in legs]
-        return list(legs)
+        return [replace(leg, points=self._expanded(leg.points)) for leg in legs]
 
-    def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> Frames | None:
+    def _expanded(self, z: FloatArray) -> FloatArray:
+        return self.moving.expanded(z) if isinstance(self.moving, HeldSystem) else z
+
+    def _search_best(self, start: FloatArray, goal: FloatArray | GoalTest) -> PlanResult | None:
+        """Search for the best plans, from the first one on; None if there is none at all.
+
+        Motions that a joint's effort cannot hold are left out, and the search is run again.
+        """
+        options, stopped = self.options, ''
+        robustness = Robustness(self.system, self.model)
+
+        def rate(formation: Formation, z: FloatArray) -> float:
+            return robustness.ratios(formation, self._expanded(z)).worst
+
+        def settled(states: int) -> None:
+            self._grown(states, 1)
+
+        best = BestFirst(self.roadmap, start, goal, options.prefer, rate, settled)
+        first, first_search = None, None
+        if not options.required:
+            first, first_search = self._search(start, goal), self.search
+            if first is None:
+                return None
+        self.search = best
+        chosen: list[Label] = []
+        try:
+            while True:
+                chosen = []
+                for label in best.ways(options.alternatives, first):
+                    legs = best.legs(label)
+                    refused = self._refused(self._whole(legs))
+                    self.roadmap.failures.update(refused.values())
+                    for index in refused:
+                        best.ban(legs[index].piece, legs[index].points)
+                    if refused:
+                        break
+                    chosen.append(label)
+                else:
+                    break
+        except _BudgetExhaustedError as stop:
+            stopped = str(stop)
+            met = best.best
+            if not chosen and met is not None and not self._refused(self._whole(best.legs(met))):
+                if first is None or best.cost(best.legs(met)) < best.cost(first):
+                    chosen = [met]
+        message = self._verdict(stopped, max(len(chosen), first is not None))
+        results = []
+        for label in chosen:
+            best.conclude(label)
+            legs = best.legs(label)
+            solved = self._solved(self._whole(legs), message)
+            results.append(replace(solved, margin=best.margin(legs)))
+        if not results and first is not None:
+            self.search = first_search
+            results = [
+                replace(self._solved(self._whole(first), message), margin=best.margin(first))
+            ]
+        if not results and stopped:
+            raise _BudgetExhaustedError(stopped)
+        return replace(results[0], alternatives=tuple(results[1:])) if results else None
+
+    def _verdict(self, stopped: str, found: int) -> str:
+        """Say whether plans are the best, and among what."""
+        prefer = self.options.prefer
+        name = Preference.FEWEST_SEGMENTS if prefer is Preference.FIRST else prefer
+        if stopped:
+            return f'{name.value}: the best found so far; {stopped}'
+        wanted = self.options.alternatives
+        few = f'no more than {found} different plans, ' if found < wanted else ''
+        pieces = self.roadmap.pieces
+        regions = sum(piece.dimension > 1 for piece in pieces)
+        rays = f', {regions} of them regions of dimension 2 and more seen along rays'
+        return (
+            f'{name.value}: {few}none better exists in the {len(pieces)} pieces of contact '
+            f'formations explored{rays if regions else ""}'
+        )
+
+    def _refused(self, legs: Sequence[Leg]) -> dict[int, str]:
+        """Which legs the joints cannot hold, or stray, and why."""
+        refused = dict.fromkeys(overloaded_legs(self.system, self.model, legs), TOO_WEAK)
+        return refused | straying_legs(self.system, legs, self.roadmap.constraints.bounds)
+
+    def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> list[Leg] | None:
         """Search until a path is found that the joints' efforts can hold.
 
         Efforts are looked at on paths only: points and curves that need more than a joint's limit
@@ -165,15 +260,13 @@ class _Planning:
         """
         blocked: frozenset[int] = frozenset()
         while True:
-            self.search = Search(self.roadmap, start, goal, blocked, self._grown)
-            if not self.search.run():
+            self.search = search = Search(self.roadmap, start, goal, blocked, self._grown)
+            if not search.run():
                 return None
-            legs = self.search.path()
-            whole = self._whole(legs)
-            refused = dict.fromkeys(overloaded_legs(self.system, self.model, whole), TOO_WEAK)
-            refused |= straying_legs(self.system, whole, self.roadmap.constraints.bounds)
+            legs = search.path()
+            refused = self._refused(self._whole(legs))
             if not refused:
-                return build_frames(self.system, self.model, whole)
+                return legs
             for index in refused:
                 leg = legs[index]
                 piece = self.roadmap.pieces[leg.piece]

@@ -103,6 +103,8 @@ class PlanResult:
         entry_lower: Shape (s, n), torque limits of each segment at its first frame, N·m, where
             the frame itself carries those of the segment before. Not in plan files.
         entry_upper: As `entry_lower`.
+        margin: Worst robustness margin of the plan, where it was chosen among several, else None.
+        alternatives: Other plans, the next best first, each without further ones.
     """
 
     problem: str
@@ -120,6 +122,8 @@ class PlanResult:
     reversible: bool = False
     entry_lower: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     entry_upper: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    margin: float | None = None
+    alternatives: tuple[PlanResult, ...] = ()
 
     @property
     def solved(self) -> bool:
@@ -139,6 +143,11 @@ class PlanResult:
         from cfplan_core.trajectory.reversal import reversed_plan
 
         return reversed_plan(self)
+
+    @property
+    def length(self) -> float:
+        """Length of the joints' path, rad."""
+        return float(np.linalg.norm(np.diff(self.joints, axis=0), axis=1).sum())
 
     @property
     def needed_force(self) -> float | None:

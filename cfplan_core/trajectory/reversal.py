@@ -50,6 +50,7 @@ def reversed_plan(result: PlanResult) -> PlanResult:
             goal_tree_nodes=statistics.initial_tree_nodes,
         ),
         trees=(goal, initial),
+        alternatives=(),
     )
 
 
