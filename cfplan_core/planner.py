@@ -198,27 +198,24 @@ class _Planning:
             while True:
                 chosen = []
                 for label in best.ways(options.alternatives, first):
-                    legs = best.legs(label)
+                    legs, arcs = best.path(label)
                     refused = self._refused(self._whole(legs))
-                    self.roadmap.failures.update(refused.values())
-                    for index in refused:
-                        best.ban(legs[index].piece, legs[index].points)
-                    if refused:
+                    if refused and arcs:
+                        self.roadmap.failures.update(refused.values())
+                        best.ban(arcs[index] for index in refused)
                         break
                     chosen.append(label)
                 else:
                     break
         except _BudgetExhaustedError as stop:
             stopped = str(stop)
-            met = best.best
-            if not chosen and met is not None and not self._refused(self._whole(best.legs(met))):
-                if first is None or best.cost(best.legs(met)) < best.cost(first):
-                    chosen = [met]
+            if not chosen and best.best is not None and self._improves(best, best.best, first):
+                chosen = [best.best]
         message = self._verdict(stopped, max(len(chosen), first is not None))
         results = []
         for label in chosen:
             best.conclude(label)
-            legs = best.legs(label)
+            legs, _ = best.path(label)
             solved = self._solved(self._whole(legs), message)
             results.append(replace(solved, margin=best.margin(legs)))
         if not results and first is not None:
@@ -229,6 +226,13 @@ class _Planning:
         if not results and stopped:
             raise _BudgetExhaustedError(stopped)
         return replace(results[0], alternatives=tuple(results[1:])) if results else None
+
+    def _improves(self, best: BestFirst, label: Label, known: Sequence[Leg] | None) -> bool:
+        """Tell whether a way can be held, and is better than a path that is known."""
+        legs, _ = best.path(label)
+        if self._refused(self._whole(legs)):
+            return False
+        return known is None or best.cost(legs) < best.cost(known)
 
     def _verdict(self, stopped: str, found: int) -> str:
         """Say whether plans are the best, and among what."""

@@ -8,13 +8,13 @@ second search that leaves out narrower arcs.
 
 A path that is taken from the queue costs no more than any that is still to come, so it is best
 among all the pieces that can be reached, as far as the roadmap reaches: through a region of
-dimension two or more it knows one motion for each pair of ends.
+dimension two or more it knows two motions for each pair of ends, over the anchor and straight.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -25,6 +25,7 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.options import Preference
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.pieces import SAME, Piece, Region
+from cfplan_core.planning.region_motion import straight_motion
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.search import Leg, Node, Tree
 
@@ -59,6 +60,7 @@ class Label:
         cost: Of the way, smaller is better, compared in lexical order.
         passed: Which required formations it passed.
         parent: The label before, None at the start.
+        arc: The motion inside the parent's piece, None at the start.
         arrived: True at the goal.
     """
 
@@ -67,6 +69,7 @@ class Label:
     cost: Cost
     passed: frozenset[int]
     parent: Label | None
+    arc: Arc | None = None
     arrived: bool = False
 
     def chain(self) -> list[Label]:
@@ -122,9 +125,9 @@ class BestFirst:
         self._prefer = prefer
         self._robustness = robustness
         self._settled = settled
-        self._arcs: dict[tuple[int, bytes, bytes], Arc] = {}
-        self._margins: dict[tuple[int, bytes, bytes], float] = {}
-        self._banned: set[tuple[int, bytes, bytes]] = set()
+        self._arcs: dict[tuple[int, bytes, bytes], tuple[Arc, ...]] = {}
+        self._margins: dict[Arc, float] = {}
+        self._banned: set[Arc] = set()
         self._floor = -np.inf
         self._ceiling: Cost = (np.inf,)
         self._tree: list[Label] = []
@@ -221,29 +224,31 @@ class BestFirst:
             visited = {before.piece.index for before in label.chain()} if count > 1 else set()
             for z, piece in self._neighbours(label.piece):
                 if piece.index not in visited:
-                    after = self._moved(label, z, piece)
-                    if after is not None:
+                    for after in self._moved(label, z, piece):
                         push(after)
 
-    def ban(self, piece: int, points: FloatArray) -> None:
-        """Leave out a motion inside a piece from now on, in either direction."""
-        first, last = _key(points[0]), _key(points[-1])
-        self._banned |= {(piece, first, last), (piece, last, first)}
+    def ban(self, arcs: Iterable[Arc]) -> None:
+        """Leave out motions from now on."""
+        self._banned.update(arcs)
         self.best = None
 
-    def legs(self, label: Label) -> list[Leg]:
-        """Motions of a way, from start to goal; those of one point are left out."""
+    def path(self, label: Label) -> tuple[list[Leg], list[Arc]]:
+        """Motions of a way, from start to goal, as legs and as arcs; those of one point left out.
+
+        A way that does not move at all has one leg and no arcs.
+        """
         chain = label.chain()
         legs: list[Leg] = []
+        arcs: list[Arc] = []
         for before, after in pairwise(chain):
-            arc = self._arc(before.piece, before.entry, after.entry)
-            if arc.moves:
-                piece = before.piece
+            piece, arc = before.piece, after.arc
+            if arc is not None and arc.moves:
                 legs.append(Leg(piece.index, piece.formation, piece.stability, arc.points))
+                arcs.append(arc)
         if not legs:
             piece = chain[0].piece
             legs.append(Leg(piece.index, piece.formation, piece.stability, chain[0].entry[None]))
-        return legs
+        return legs, arcs
 
     def conclude(self, label: Label) -> None:
         """Set `trees` and `meeting` for a way that was chosen."""
@@ -269,24 +274,22 @@ class BestFirst:
 
     def _moved(
         self, label: Label, z: FloatArray, piece: Piece, arrived: bool = False
-    ) -> Label | None:
-        """The label behind a motion from a label's entry to z; None if it may not be made."""
-        key = (label.piece.index, _key(label.entry), _key(z))
-        if key in self._banned:
-            return None
-        arc = self._arc(label.piece, label.entry, z)
+    ) -> Iterator[Label]:
+        """Labels behind the motions from a label's entry to z."""
         first, second = label.cost
-        if self._prefer is Preference.ROBUST or self._floor > -np.inf:
-            margin = self._margin(key, label.piece, arc)
-            if margin < self._floor:
-                return None
-        if self._prefer is Preference.ROBUST:
-            cost: Cost = (max(first, -margin), second + arc.length)
-        elif self._prefer is Preference.SHORTEST:
-            cost = (first + arc.length, second + arc.moves)
-        else:
-            cost = (first + arc.moves, second + arc.length)
-        return Label(piece, z, cost, self._passing(piece, label.passed), label, arrived)
+        passed = self._passing(piece, label.passed)
+        for arc in self._motions(label.piece, label.entry, z):
+            if arc in self._banned:
+                continue
+            cost: Cost = (first + arc.moves, second + arc.length)
+            if self._prefer is Preference.ROBUST:
+                margin = self._margin(label.piece, arc)
+                cost = (max(first, -margin), second + arc.length)
+            elif self._prefer is Preference.SHORTEST:
+                if self._floor > -np.inf and self._margin(label.piece, arc) < self._floor:
+                    continue
+                cost = (first + arc.length, second + arc.moves)
+            yield Label(piece, z, cost, passed, label, arc, arrived)
 
     def _bound(self, label: Label) -> Cost:
         """A cost that no way to the goal over a label falls short of."""
@@ -313,9 +316,7 @@ class BestFirst:
         else:
             z = self._goal if label.piece is goal else None
         if z is not None:
-            arrival = self._moved(label, z, label.piece, arrived=True)
-            if arrival is not None:
-                yield arrival
+            yield from self._moved(label, z, label.piece, arrived=True)
 
     def _fulfilled(self, test: GoalTest, label: Label) -> FloatArray | None:
         if test.may_hold(label.piece) and test.fits(label.entry):
@@ -332,22 +333,27 @@ class BestFirst:
         yield from self._roadmap.neighbours(piece)
         yield from self._roadmap.regions.beside(piece)
 
-    def _arc(self, piece: Piece, start: FloatArray, end: FloatArray) -> Arc:
+    def _motions(self, piece: Piece, start: FloatArray, end: FloatArray) -> tuple[Arc, ...]:
+        """Motions inside a piece: one along a curve; over the anchor and straight in a region."""
         key = (piece.index, _key(start), _key(end))
         if key not in self._arcs:
-            points = piece.path(start, end)
-            moves = bool(np.abs(points - points[0]).max() > 0.0)
-            self._arcs[key] = Arc(points, moves, joint_length(points))
+            found = [piece.path(start, end)]
+            if isinstance(piece, Region):
+                straight = straight_motion(self._roadmap, piece, start, end)
+                found += [] if straight is None else [straight]
+            self._arcs[key] = tuple(
+                Arc(points, bool(np.abs(points - points[0]).max() > 0.0), joint_length(points))
+                for points in found
+            )
         return self._arcs[key]
 
-    def _margin(self, key: tuple[int, bytes, bytes], piece: Piece, arc: Arc) -> float:
-        """Worst margin of an arc; the same in either direction."""
+    def _margin(self, piece: Piece, arc: Arc) -> float:
+        """Worst margin of a motion."""
         if not arc.moves:
             return float(np.inf)
-        if key not in self._margins:
-            worst = self._robustness(piece.formation, arc.points)
-            self._margins[key] = self._margins[key[0], key[2], key[1]] = worst
-        return self._margins[key]
+        if arc not in self._margins:
+            self._margins[arc] = self._robustness(piece.formation, arc.points)
+        return self._margins[arc]
 
 
 def joint_length(points: FloatArray) -> float:
