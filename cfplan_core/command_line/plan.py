@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -22,8 +22,9 @@ from cfplan_core.command_line.console import (
     print_findings,
 )
 from cfplan_core.command_line.inputs import Examined, examine
+from cfplan_core.command_line.plan_options import wanted_plan
 from cfplan_core.command_line.progress import progress_bar
-from cfplan_core.errors import InvalidProblemError
+from cfplan_core.errors import CfplanError, InvalidProblemError
 from cfplan_core.model import Problem
 from cfplan_core.trajectory.plan_result import PlanResult, Status
 
@@ -49,13 +50,6 @@ def finite_seconds(
     return value
 
 
-def weights(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
-    """Accept an option's number of weights of the object if contacts can press that hard."""
-    if value is not None and not (math.isfinite(value) and value > 0.0):
-        raise click.BadParameter(f'{value} is not a finite number of weights above zero.')
-    return value
-
-
 @click.command(short_help='Search for a plan.')
 @click.argument('file', type=click.Path(path_type=Path))
 @click.option(
@@ -63,7 +57,8 @@ def weights(ctx: click.Context, param: click.Parameter, value: float | None) -> 
     'json_path',
     type=click.Path(dir_okay=False, path_type=Path),
     metavar='OUT',
-    help='Write the result here as JSON, whatever the outcome; missing directories are created.',
+    help='Write the result here as JSON, whatever the outcome; missing directories are created. '
+    'Alternatives go beside it, as OUT with .2, .3 and so on before its suffix.',
 )
 @click.option(
     '--figures',
@@ -85,20 +80,14 @@ def weights(ctx: click.Context, param: click.Parameter, value: float | None) -> 
     metavar='N',
     help='Give up once the two trees have N nodes or more together.',
 )
-@click.option(
-    '--max-needed-force',
-    type=float,
-    callback=weights,
-    metavar='F',
-    help='Nowhere may the contacts need more than F weights of the object to hold it.',
-)
+@wanted_plan
 def plan(
     file: Path,
     json_path: Path | None,
     figure_directory: Path | None,
     time_budget: float | None,
     max_nodes: int | None,
-    max_needed_force: float | None,
+    **wanted: Any,
 ) -> int:
     """Search for a plan that solves the problem FILE, and print it as tables.
 
@@ -111,7 +100,11 @@ def plan(
         if directory is not None:
             directory.mkdir(parents=True, exist_ok=True)
 
-    options = PlanOptions(time_budget, max_nodes, max_needed_force)
+    try:
+        options = PlanOptions(time_budget=time_budget, max_nodes=max_nodes, **wanted)
+    except CfplanError as error:
+        complain(str(error))
+        return INVALID_INPUT
     examined = examine(file)
     try:
         problem = examined.valid_problem()
@@ -128,6 +121,10 @@ def plan(
     # Files first: they must be there even if the reader of the tables leaves early.
     if json_path is not None:
         write_result(result, json_path)
+        for number, other in enumerate(result.alternatives, 2):
+            write_result(
+                other, json_path.with_name(f'{json_path.stem}.{number}{json_path.suffix}')
+            )
     figures: list[Path] = []
     if figure_directory is not None and result.status is not Status.INVALID:
         from cfplan_core.report.figures import write_figures
