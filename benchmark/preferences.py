@@ -8,7 +8,15 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from cfplan_core import PlanOptions, PlanResult, Preference, load_problem, plan, verify_plan
+from cfplan_core import (
+    PlanOptions,
+    PlanResult,
+    Preference,
+    load_problem,
+    plan,
+    plan_margin,
+    verify_plan,
+)
 
 PROBLEMS = Path(__file__).parents[1] / 'config' / 'problems'
 # The problems of one joint for each of two fingers: others need a time budget.
@@ -30,12 +38,12 @@ def main() -> None:
             elapsed = time.perf_counter() - began
             if not verify_plan(problem, result).ok:
                 raise SystemExit(f'{name}: the plan preferred as {prefer.value} does not verify')
-            print(_row(name, prefer, result, elapsed), flush=True)
+            margin = plan_margin(problem, result)
+            print(_row(name, prefer, result, margin, elapsed), flush=True)
 
 
-def _row(name: str, prefer: Preference, result: PlanResult, elapsed: float) -> str:
+def _row(name: str, prefer: Preference, result: PlanResult, margin: float, elapsed: float) -> str:
     counts = {len(segment.contacts) for segment in result.segments}
-    margin = '' if result.margin is None else f'{result.margin:.3f}'
     cells = [
         name if prefer is Preference.FIRST else '',
         prefer.value,
@@ -43,7 +51,7 @@ def _row(name: str, prefer: Preference, result: PlanResult, elapsed: float) -> s
         ', '.join(map(str, sorted(counts))),
         f'{result.length:.3f}',
         f'{result.needed_force:.2f}',
-        margin,
+        f'{margin:.3f}',
         f'{elapsed:.2f}',
     ]
     return f'| {" | ".join(cells)} |'

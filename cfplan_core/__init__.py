@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from cfplan_core.planner import plan as plan
     from cfplan_core.trajectory.plan_file import read_plan as read_plan
     from cfplan_core.trajectory.plan_file import write_plan as write_plan
+    from cfplan_core.trajectory.plan_margin import plan_margin as plan_margin
     from cfplan_core.trajectory.plan_result import PlanResult as PlanResult
     from cfplan_core.trajectory.plan_result import Segment as Segment
     from cfplan_core.trajectory.plan_result import Statistics as Statistics
@@ -59,6 +60,7 @@ _HOMES = {
     'options': ('PlanOptions', 'Preference'),
     'planner': ('Progress', 'plan'),
     'trajectory.plan_file': ('read_plan', 'write_plan'),
+    'trajectory.plan_margin': ('plan_margin',),
     'trajectory.plan_result': ('PlanResult', 'Segment', 'Statistics', 'Status'),
     'verification': ('verify_plan',),
 }

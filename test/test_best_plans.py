@@ -19,6 +19,7 @@ from cfplan_core import (
     Status,
     load_problem,
     plan,
+    plan_margin,
     verify_plan,
 )
 from cfplan_core.contact.formation import Formation
@@ -153,25 +154,13 @@ def test_robust_plans_at_least_double_the_margin_of_the_first(name: str) -> None
     problem, first = planned(name, PlanOptions())
     robust = certified(name, prefer='robust')
     assert robust.margin is not None
-    assert robust.margin >= 2.0 * margin_of(problem, first)
+    assert robust.margin >= 2.0 * plan_margin(problem, first)
 
 
-def margin_of(problem: Problem, result: PlanResult) -> float:
-    """Margin of a plan's frames."""
-    system = ContactSystem(problem)
-    robustness = Robustness(system, FrictionlessModel(system.load))
-    com = problem.object.center_of_mass
-    turn = np.exp(1j * result.object_poses[:, 2]) * complex(*com)
-    center = (result.object_poses[:, :2] + np.stack([turn.real, turn.imag], 1)) / system.size
-    z = np.concatenate([center, result.object_poses[:, 2:], result.joints], axis=1)
-    pair_of = {system.contact_names([k])[0]: k for k in range(system.contact_count)}
-    return min(
-        robustness.ratios(
-            Formation(tuple(sorted(pair_of[name] for name in segment.contacts))),
-            z[segment.first_frame : segment.last_frame + 1],
-        ).worst
-        for segment in result.segments
-    )
+@pytest.mark.parametrize('name', ['h013', 'h122'])
+def test_the_margin_of_a_plan_can_be_measured_on_its_frames(name: str) -> None:
+    problem, result = planned(name, PlanOptions(prefer=Preference.ROBUST))
+    assert plan_margin(problem, result) == pytest.approx(result.margin, abs=0.01)
 
 
 def test_three_contacts_are_used_where_they_shorten_the_way() -> None:

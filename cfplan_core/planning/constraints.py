@@ -171,4 +171,9 @@ def contradictions(
             findings.append(
                 Finding(_FILE, f'goal.joints.{name}', value, f'{angle:.9g} rad, as at the start')
             )
+    moving = set(goal.joints or ()) - set(held)
+    if held and goal.object_pose is None and not goal.contacts and not moving:
+        value = 'only angles of joints that are held'
+        expected = 'an object pose, contacts, or a joint that moves'
+        findings.append(Finding(_FILE, 'goal', value, expected))
     return tuple(findings)
