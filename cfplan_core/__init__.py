@@ -28,11 +28,13 @@ if TYPE_CHECKING:
     from cfplan_core.model import Problem as Problem
     from cfplan_core.model import Tolerance as Tolerance
     from cfplan_core.model.loading import load_problem as load_problem
-    from cfplan_core.planner import PlanOptions as PlanOptions
+    from cfplan_core.options import PlanOptions as PlanOptions
+    from cfplan_core.options import Preference as Preference
     from cfplan_core.planner import Progress as Progress
     from cfplan_core.planner import plan as plan
     from cfplan_core.trajectory.plan_file import read_plan as read_plan
     from cfplan_core.trajectory.plan_file import write_plan as write_plan
+    from cfplan_core.trajectory.plan_margin import plan_margin as plan_margin
     from cfplan_core.trajectory.plan_result import PlanResult as PlanResult
     from cfplan_core.trajectory.plan_result import Segment as Segment
     from cfplan_core.trajectory.plan_result import Statistics as Statistics
@@ -55,8 +57,10 @@ _HOMES = {
         'Tolerance',
     ),
     'model.loading': ('load_problem',),
-    'planner': ('PlanOptions', 'Progress', 'plan'),
+    'options': ('PlanOptions', 'Preference'),
+    'planner': ('Progress', 'plan'),
     'trajectory.plan_file': ('read_plan', 'write_plan'),
+    'trajectory.plan_margin': ('plan_margin',),
     'trajectory.plan_result': ('PlanResult', 'Segment', 'Statistics', 'Status'),
     'verification': ('verify_plan',),
 }

@@ -69,6 +69,7 @@ class ContactSystem:
         self.load = np.array([weight[0], weight[1], 0.0])
 
         hand = problem.hand
+        self.joint_names = hand.joint_names
         self.joint_count = len(hand.joints)
         self.dof = 3 + self.joint_count
         self.lower = np.array([joint.lower for joint in hand.joints])

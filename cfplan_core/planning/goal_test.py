@@ -39,7 +39,7 @@ class GoalTest:
             columns += [0, 1, 2]
             wanted += [center.real, center.imag, float(phi)]
             tolerance += [goal.tolerance.position / system.size] * 2 + [goal.tolerance.angle]
-        names = system.problem.hand.joint_names
+        names = system.joint_names
         for name, angle in (goal.joints or {}).items():
             if name not in names:
                 raise CfplanError(f'joint {name!r}: expected one of {", ".join(names)}')

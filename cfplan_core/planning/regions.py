@@ -142,7 +142,7 @@ class Regions:
         trace = self._ray(z, way, _DEPTH)
         self._roadmap.attempts += 1
         if len(trace.points) < 3:
-            self._roadmap.failures[f'at once, {trace.kind.value}'] += 1
+            self._roadmap.failures[f'at once, {trace.why}'] += 1
             return None
         points = split_by_class(self._roadmap.tracer, way.formation, trace.points)[0][1]
         return self._merge(way.formation, z, points[: len(points) // 2 + 1])
@@ -239,14 +239,14 @@ class Regions:
             (_, points), *others = split_by_class(roadmap.tracer, region.formation, trace.points)
             end = points[-1]
             if np.abs(end - region.anchor).max() < SAME:
-                roadmap.failures[f'at once, {trace.kind.value}'] += 1
+                roadmap.failures[f'at once, {trace.why}'] += 1
                 continue
             if others:
                 ways = [Departure(region.formation, _heading(points), frozenset())]
             elif trace.kind in OPEN_EVENTS:
                 ways = self._ways(region, end, _heading(points))
             else:
-                roadmap.failures[trace.kind.value] += 1
+                roadmap.failures[trace.why] += 1
                 continue
             region.links.append((end, points))
             if not others and self._joins(region, end):
