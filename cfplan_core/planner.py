@@ -16,10 +16,10 @@ from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Goal, Problem
 from cfplan_core.options import PlanOptions as PlanOptions
 from cfplan_core.options import Preference
-from cfplan_core.planning.best_first import BestFirst, Label
+from cfplan_core.planning.best_first import BestFirst
 from cfplan_core.planning.constraints import REASONS, compile_constraints, contradictions
 from cfplan_core.planning.goal_test import GoalTest
-from cfplan_core.planning.grasp_check import ExaminedGrasp, examine_problem
+from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.manifold import settle
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
@@ -116,7 +116,9 @@ class _Planning:
         goal: FloatArray | GoalTest
         try:
             if examined.goal is not None:
-                goal = self._moving_goal(examined.goal)
+                goal = self.moving.reduced(examined.goal.z)
+                if self.options.held_joints:
+                    goal = settle(self.moving, goal, examined.goal.pairs)
             else:
                 goal = GoalTest(self.moving, self._free_goal())
         except CfplanError as error:
@@ -133,11 +135,11 @@ class _Planning:
             return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
         if legs is None:
             return self._answer(Status.INFEASIBLE, f'no path; {self._explored()}{self._doubt()}')
-        return self._solved(self._whole(legs), '')
+        return self._solved(legs, '')
 
     def _solved(self, legs: Sequence[Leg], message: str) -> PlanResult:
         """The answer for a path, with the trees of the search that found it."""
-        frames = build_frames(self.system, self.model, legs)
+        frames = build_frames(self.system, self.model, self._whole(legs))
         return replace(
             self._answer(Status.SOLVED, message),
             times=frames.times,
@@ -151,12 +153,6 @@ class _Planning:
             entry_upper=frames.entry_upper,
         )
 
-    def _moving_goal(self, goal: ExaminedGrasp) -> FloatArray:
-        """The goal grasp in the coordinates that move, exactly on its contacts."""
-        if isinstance(self.moving, HeldSystem):
-            return settle(self.moving, self.moving.reduced(goal.z), goal.pairs)
-        return goal.z
-
     def _free_goal(self) -> Goal:
         """The goal without the angles of held joints, which agree with the start's."""
         goal, held = self.problem.goal, self.options.held_joints
@@ -167,10 +163,7 @@ class _Planning:
 
     def _whole(self, legs: Sequence[Leg]) -> list[Leg]:
         """Legs in the coordinates of all joints."""
-        return [replace(leg, points=self._expanded(leg.points)) for leg in legs]
-
-    def _expanded(self, z: FloatArray) -> FloatArray:
-        return self.moving.expanded(z) if isinstance(self.moving, HeldSystem) else z
+        return [replace(leg, points=self.moving.expanded(leg.points)) for leg in legs]
 
     def _search_best(self, start: FloatArray, goal: FloatArray | GoalTest) -> PlanResult | None:
         """Search for the best plans, from the first one on; None if there is none at all.
@@ -181,7 +174,7 @@ class _Planning:
         robustness = Robustness(self.system, self.model)
 
         def rate(formation: Formation, z: FloatArray) -> float:
-            return robustness.ratios(formation, self._expanded(z)).worst
+            return robustness.ratios(formation, self.moving.expanded(z)).worst
 
         def settled(states: int) -> None:
             self._grown(states, 1)
@@ -193,46 +186,31 @@ class _Planning:
             if first is None:
                 return None
         self.search = best
-        chosen: list[Label] = []
         try:
-            while True:
-                chosen = []
-                for label in best.ways(options.alternatives, first):
-                    legs, arcs = best.path(label)
-                    refused = self._refused(self._whole(legs))
-                    if refused and arcs:
-                        self.roadmap.failures.update(refused.values())
-                        best.ban(arcs[index] for index in refused)
-                        break
-                    chosen.append(label)
-                else:
-                    break
+            best.choose(options.alternatives, first, self._refuse)
         except _BudgetExhaustedError as stop:
             stopped = str(stop)
-            if not chosen and best.best is not None and self._improves(best, best.best, first):
-                chosen = [best.best]
-        message = self._verdict(stopped, max(len(chosen), first is not None))
+            best.settle_for_best(first, self._refuse)
+        message = self._verdict(stopped, max(len(best.chosen), first is not None))
         results = []
-        for label in chosen:
+        for label in best.chosen:
             best.conclude(label)
-            legs, _ = best.path(label)
-            solved = self._solved(self._whole(legs), message)
-            results.append(replace(solved, margin=best.margin(legs)))
+            legs, _ = label.path()
+            results.append(replace(self._solved(legs, message), margin=best.margin(legs)))
         if not results and first is not None:
             self.search = first_search
-            results = [
-                replace(self._solved(self._whole(first), message), margin=best.margin(first))
-            ]
+            results = [replace(self._solved(first, message), margin=best.margin(first))]
         if not results and stopped:
             raise _BudgetExhaustedError(stopped)
         return replace(results[0], alternatives=tuple(results[1:])) if results else None
 
-    def _improves(self, best: BestFirst, label: Label, known: Sequence[Leg] | None) -> bool:
-        """Tell whether a way can be held, and is better than a path that is known."""
-        legs, _ = best.path(label)
-        if self._refused(self._whole(legs)):
-            return False
-        return known is None or best.cost(legs) < best.cost(known)
+    def _refuse(self, legs: Sequence[Leg]) -> list[int]:
+        """Which legs cannot be held, with the reasons noted."""
+        whole = self._whole(legs)
+        refused = dict.fromkeys(overloaded_legs(self.system, self.model, whole), TOO_WEAK)
+        refused |= straying_legs(self.system, whole, self.roadmap.constraints.bounds)
+        self.roadmap.failures.update(refused.values())
+        return list(refused)
 
     def _verdict(self, stopped: str, found: int) -> str:
         """Say whether plans are the best, and among what."""
@@ -250,11 +228,6 @@ class _Planning:
             f'formations explored{rays if regions else ""}'
         )
 
-    def _refused(self, legs: Sequence[Leg]) -> dict[int, str]:
-        """Which legs the joints cannot hold, or stray, and why."""
-        refused = dict.fromkeys(overloaded_legs(self.system, self.model, legs), TOO_WEAK)
-        return refused | straying_legs(self.system, legs, self.roadmap.constraints.bounds)
-
     def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> list[Leg] | None:
         """Search until a path is found that the joints' efforts can hold.
 
@@ -268,7 +241,7 @@ class _Planning:
             if not search.run():
                 return None
             legs = search.path()
-            refused = self._refused(self._whole(legs))
+            refused = self._refuse(legs)
             if not refused:
                 return legs
             for index in refused:
@@ -283,7 +256,6 @@ class _Planning:
                         self.roadmap.regions.drop(piece, z)
                 else:
                     blocked |= {piece.index}
-            self.roadmap.failures.update(refused.values())
 
     def _checkpoint(self) -> None:
         """Stop the search when it has to."""

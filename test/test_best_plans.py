@@ -25,12 +25,13 @@ from cfplan_core import (
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.mechanics.frictionless import FrictionlessModel
-from cfplan_core.planning.best_first import BestFirst, joint_length
+from cfplan_core.planning.best_first import BestFirst
 from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.pieces import Piece, Region
 from cfplan_core.planning.region_motion import straight_motion
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.robustness import Robustness
+from cfplan_core.planning.ways import joint_length
 
 PROBLEMS = Path(__file__).parents[1] / 'config' / 'problems'
 CHOICES = ['fewest-segments', 'shortest', 'robust']
@@ -119,7 +120,7 @@ def explored(name: str) -> Explored:
 def test_the_shortest_path_is_that_of_another_search_over_the_same_motions(name: str) -> None:
     graph = explored(name)
     search = graph.search(Preference.SHORTEST)
-    legs, _ = search.path(next(search.ways(1)))
+    legs, _ = next(search.ways(1)).path()
     length = sum(joint_length(leg.points) for leg in legs)
     assert length == pytest.approx(graph.shortest(), abs=1e-9)
 
@@ -128,7 +129,7 @@ def test_the_shortest_path_is_that_of_another_search_over_the_same_motions(name:
 def test_no_path_is_wider_than_the_most_robust_and_none_as_wide_is_shorter(name: str) -> None:
     graph = explored(name)
     search = graph.search(Preference.ROBUST)
-    legs, _ = search.path(next(search.ways(1)))
+    legs, _ = next(search.ways(1)).path()
     margin = search.margin(legs)
     length = sum(joint_length(leg.points) for leg in legs)
     assert length == pytest.approx(graph.shortest(margin), abs=1e-9)

@@ -204,6 +204,14 @@ class ContactSystem:
         center = np.array([x + c * com[0] - s * com[1], y + s * com[0] + c * com[1]]) / self.size
         return np.concatenate([center, [phi], grasp.joints])
 
+    def reduced(self, z: FloatArray) -> FloatArray:
+        """Leave out what is held of configurations of the whole system: nothing here."""
+        return z
+
+    def expanded(self, z: FloatArray) -> FloatArray:
+        """Turn configurations of shape (s, 3 + n) into those of the whole system."""
+        return z
+
     def object_poses(self, z: FloatArray) -> FloatArray:
         """Pose of the object's frame in SI units, shape (s, 3), for configurations (s, 3 + n)."""
         com = self.problem.object.center_of_mass

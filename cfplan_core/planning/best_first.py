@@ -14,9 +14,7 @@ dimension two or more it knows two motions for each pair of ends, over the ancho
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -28,64 +26,10 @@ from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.region_motion import straight_motion
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.search import Leg, Node, Tree
+from cfplan_core.planning.ways import Arc, Cost, Label, joint_length
 
-Cost = tuple[float, ...]
 # Rates a motion inside a piece: its points, shape (s, 3 + n), in a formation.
 Rate = Callable[[Formation, FloatArray], float]
-
-
-@dataclass(frozen=True, eq=False)
-class Arc:
-    """A motion inside a piece.
-
-    Attributes:
-        points: Shape (s, 3 + n).
-        moves: False if nothing moves.
-        length: Of the joints' path, rad.
-    """
-
-    points: FloatArray
-    moves: bool
-    length: float
-
-
-@dataclass(frozen=True, eq=False)
-class Label:
-    """A way to a state.
-
-    Attributes:
-        piece: Where it is.
-        entry: Configuration where the piece is entered, shape (3 + n,); for a label at the goal
-            the goal.
-        cost: Of the way, smaller is better, compared in lexical order.
-        passed: Which required formations it passed.
-        parent: The label before, None at the start.
-        arc: The motion inside the parent's piece, None at the start.
-        arrived: True at the goal.
-    """
-
-    piece: Piece
-    entry: FloatArray
-    cost: Cost
-    passed: frozenset[int]
-    parent: Label | None
-    arc: Arc | None = None
-    arrived: bool = False
-
-    def chain(self) -> list[Label]:
-        """Labels from the start to this one."""
-        labels = [self]
-        while labels[-1].parent is not None:
-            labels.append(labels[-1].parent)
-        return labels[::-1]
-
-    def formations(self) -> tuple[Formation, ...]:
-        """Contact formations in their order, without those passed in an instant."""
-        found: list[Formation] = []
-        for label in self.chain():
-            if label.piece.dimension > 0 and label.piece.formation not in found[-1:]:
-                found.append(label.piece.formation)
-        return tuple(found)
 
 
 class BestFirst:
@@ -93,6 +37,7 @@ class BestFirst:
 
     Attributes:
         best: The cheapest way to the goal met so far, None before there is one.
+        chosen: Ways that `choose` has come to, best first.
         states: Number of states that were settled.
         trees: What was searched as CF-trees, the goal's of one node; see `conclude`.
         meeting: Index of the piece of the goal, None before `conclude`.
@@ -118,6 +63,7 @@ class BestFirst:
             settled: Called with the number of states before one is added; may raise.
         """
         self.best: Label | None = None
+        self.chosen: list[Label] = []
         self.states = 0
         self._roadmap = roadmap
         self._start = start
@@ -227,28 +173,39 @@ class BestFirst:
                     for after in self._moved(label, z, piece):
                         push(after)
 
-    def ban(self, arcs: Iterable[Arc]) -> None:
-        """Leave out motions from now on."""
-        self._banned.update(arcs)
-        self.best = None
+    def choose(
+        self, count: int, known: Sequence[Leg] | None, refused: Callable[[list[Leg]], list[int]]
+    ) -> None:
+        """Search until the best ways that can be held are in `chosen`.
 
-    def path(self, label: Label) -> tuple[list[Leg], list[Arc]]:
-        """Motions of a way, from start to goal, as legs and as arcs; those of one point left out.
-
-        A way that does not move at all has one leg and no arcs.
+        Args:
+            count: How many are wanted.
+            known: A path that is known; if one is wanted, only a better one is chosen.
+            refused: Tells which legs of a path cannot be held, by index. These are left out, and
+                the search is run again.
         """
-        chain = label.chain()
-        legs: list[Leg] = []
-        arcs: list[Arc] = []
-        for before, after in pairwise(chain):
-            piece, arc = before.piece, after.arc
-            if arc is not None and arc.moves:
-                legs.append(Leg(piece.index, piece.formation, piece.stability, arc.points))
-                arcs.append(arc)
-        if not legs:
-            piece = chain[0].piece
-            legs.append(Leg(piece.index, piece.formation, piece.stability, chain[0].entry[None]))
-        return legs, arcs
+        while True:
+            self.chosen = []
+            for label in self.ways(count, known):
+                legs, arcs = label.path()
+                weak = refused(legs)
+                if weak and arcs:
+                    self._banned.update(arcs[index] for index in weak)
+                    self.best = None
+                    break
+                self.chosen.append(label)
+            else:
+                return
+
+    def settle_for_best(
+        self, known: Sequence[Leg] | None, refused: Callable[[list[Leg]], list[int]]
+    ) -> None:
+        """Choose the best way met so far, where `choose` was stopped before it chose any."""
+        if self.chosen or self.best is None:
+            return
+        legs, _ = self.best.path()
+        if not refused(legs) and (known is None or self.cost(legs) < self.cost(known)):
+            self.chosen = [self.best]
 
     def conclude(self, label: Label) -> None:
         """Set `trees` and `meeting` for a way that was chosen."""
@@ -354,11 +311,6 @@ class BestFirst:
         if arc not in self._margins:
             self._margins[arc] = self._robustness(piece.formation, arc.points)
         return self._margins[arc]
-
-
-def joint_length(points: FloatArray) -> float:
-    """Length of the joints' path through configurations of shape (s, 3 + n), rad."""
-    return float(np.linalg.norm(np.diff(points[:, 3:], axis=0), axis=1).sum())
 
 
 def _key(z: FloatArray) -> bytes:
