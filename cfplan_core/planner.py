@@ -17,6 +17,7 @@ from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.search import Search, Tree
+from cfplan_core.planning.sheets import RESOLUTION
 from cfplan_core.trajectory.frames import Frames, build_frames, overloaded_legs
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
 
@@ -28,12 +29,17 @@ class PlanOptions:
     Attributes:
         time_budget: Seconds, or None for no limit.
         max_nodes: Nodes of both trees together, or None for no limit.
+        resolution: Spacing of the grid of joint angles, rad, over which contact formations of
+            dimension 2 are explored; for hands of two joints.
     """
 
     time_budget: float | None = None
     max_nodes: int | None = None
+    resolution: float = RESOLUTION
 
     def __post_init__(self) -> None:
+        if not 1e-3 <= self.resolution <= 1.0:
+            raise CfplanError(f'resolution: got {self.resolution}, expected 0.001 to 1 rad')
         if self.time_budget is not None and not self.time_budget > 0.0:
             raise CfplanError(f'time_budget: got {self.time_budget}, expected seconds above zero')
         if self.max_nodes is not None and not self.max_nodes > 0:
@@ -100,7 +106,7 @@ class _Planning:
         self.began = time.perf_counter()
         self.system = ContactSystem(problem)
         self.model = FrictionlessModel(self.system.load)
-        self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
+        self.roadmap = Roadmap(self.system, self.model, self._checkpoint, options.resolution)
         self.search: Search | None = None
 
     def run(self) -> PlanResult:
@@ -189,17 +195,12 @@ class _Planning:
 
     def _doubt(self) -> str:
         """How far an answer of no path is short of a proof."""
-        regions = sum(piece.dimension > 1 for piece in self.roadmap.pieces)
         blocked = self.roadmap.failures['a joint would exceed its effort limit']
         doubt = ''
         if blocked:
             doubt += f'. Left out, as a joint would exceed its effort limit: {blocked} pieces'
-        if not regions:
-            return doubt
-        return doubt + (
-            '. Contact formations of dimension 0 and 1 were searched completely, '
-            f'{regions} regions of dimension 2 and more only along rays'
-        )
+        coverage = self.roadmap.regions.coverage()
+        return f'{doubt}. {coverage[0].upper()}{coverage[1:]}'
 
     def _answer(self, status: Status, message: str) -> PlanResult:
         trees = self.search.trees if self.search is not None else ()

@@ -23,7 +23,7 @@ from cfplan_core.planning.events import OPEN_EVENTS, EventKind
 from cfplan_core.planning.manifold import independent_rows, tangent_basis
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.stability_classes import split_by_class
-from cfplan_core.planning.tracing import STABILITY_MARGIN, Trace, classify
+from cfplan_core.planning.tracing import STABILITY_MARGIN, STEP, Trace, classify
 from cfplan_core.planning.transitions import Departure, crossings
 
 if TYPE_CHECKING:
@@ -48,6 +48,20 @@ class Regions:
         self._known: dict[tuple[Formation, Stability], list[Region]] = {}
         self._beyond: dict[int, list[tuple[FloatArray, Piece]]] = {}
         self._beside: dict[int, list[tuple[FloatArray, Piece]]] = {}
+
+    def coverage(self) -> str:
+        """Say how completely formations were explored."""
+        regions = sum(piece.dimension > 1 for piece in self._roadmap.pieces)
+        if not regions:
+            return (
+                'everything that can be reached with first-order stability was explored: no '
+                'region of dimension 2 or more, and curves in steps of at most '
+                f'{STEP:g} rad and object sizes'
+            )
+        return (
+            'contact formations of dimension 0 and 1 were searched completely, '
+            f'{regions} regions of dimension 2 and more only along rays'
+        )
 
     def around(self, formation: Formation, z: FloatArray) -> Region:
         """Return the region of a formation that a stable configuration lies inside."""

@@ -22,6 +22,7 @@ from cfplan_core.planning.events import OPEN_EVENTS
 from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
 from cfplan_core.planning.pieces import SAME, Junction, Piece
 from cfplan_core.planning.regions import Regions
+from cfplan_core.planning.sheets import RESOLUTION, Sheets
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STEP, Trace, Tracer, classify
 from cfplan_core.planning.transitions import Departure, departures, surroundings
@@ -42,6 +43,7 @@ class Roadmap:
         system: ContactSystem,
         model: ContactModel,
         checkpoint: Callable[[], None] = lambda: None,
+        resolution: float = RESOLUTION,
     ) -> None:
         """Start empty.
 
@@ -49,6 +51,8 @@ class Roadmap:
             system: Compiled problem.
             model: Mechanics.
             checkpoint: Called before every stretch of work; may raise to interrupt.
+            resolution: Spacing of the grid that regions of hands with two joints are filled over,
+                rad.
         """
         self.system = system
         self.model = model
@@ -59,7 +63,9 @@ class Roadmap:
         self._junctions: list[Junction] = []
         self._cells: dict[tuple[int, ...], list[Junction]] = {}
         self._curves: dict[Formation, list[Piece]] = {}
-        self.regions = Regions(self)
+        self.regions: Regions = (
+            Sheets(self, resolution) if system.joint_count == 2 else Regions(self)
+        )
 
     def formations(self) -> int:
         """Count the distinct contact formations that were met."""
