@@ -20,7 +20,7 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.events import EventKind
 from cfplan_core.planning.joint_grid import JointGrid, Place
 from cfplan_core.planning.manifold import independent_rows
-from cfplan_core.planning.pieces import Piece, Region
+from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.regions import Regions, _heading
 from cfplan_core.planning.sheet_filling import Table, fill
 from cfplan_core.planning.sheet_graph import Border, Sheet
@@ -209,16 +209,14 @@ class Sheets(Regions):
         assert isinstance(region, Sheet)
         for border in region.borders:
             self._roadmap.attempts += 1
-            z, heading = border.z, _heading(border.points)
+            z = border.z
             region.links.append((z, border.points))
-            if border.changes_class:
-                ways = [Departure(region.formation, heading, frozenset())]
-            elif self._joins(region, z):
+            if not border.changes_class and self._joins(region, z):
                 yield z, self._roadmap.root(z)
-                continue
-            else:
-                ways = self._ways(region, z, heading)
-            for way in ways:
-                entered = self._enter(z, way)
-                if entered is not None and entered is not region:
-                    yield z, entered
+            elif np.abs(border.points - z).max() > SAME:
+                heading = _heading(border.points)
+                onwards = [Departure(region.formation, heading, frozenset())]
+                for way in onwards if border.changes_class else self._ways(region, z, heading):
+                    entered = self._enter(z, way)
+                    if entered is not None and entered is not region:
+                        yield z, entered
