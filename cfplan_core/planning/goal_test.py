@@ -65,7 +65,7 @@ class GoalTest:
             return np.asarray(piece.points[len(piece.points) // 2])
         distance = np.abs(piece.points[:, self.columns] - self.wanted).max(axis=1)
         for nearest in _local_minima(distance):
-            if piece.dimension == 0:
+            if piece.dimension != 1:
                 z = piece.points[nearest]
             elif distance[nearest] < 2.0 * STEP:
                 z = self._nearest(piece, piece.points[nearest])
