@@ -207,6 +207,9 @@ class Sheets(Regions):
     def _shoot(self, region: Region) -> Iterator[tuple[FloatArray, Piece]]:
         """Pieces behind the borders of a sheet."""
         assert isinstance(region, Sheet)
+        if region.places == [None]:
+            # A strip narrower than the grid may be long.
+            yield from super()._shoot(region)
         for border in region.borders:
             self._roadmap.attempts += 1
             z = border.z
