@@ -123,21 +123,30 @@ class Regions:
 
     def _openings(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
         tracer = self._roadmap.tracer
+        points = self._samples(piece)
         for pair in piece.formation.pairs:
             rest = Formation(tuple(p for p in piece.formation.pairs if p != pair))
             if len(rest) < 3:
                 continue
-            holds = tracer.margins(rest, piece.points).stable > STABILITY_MARGIN
+            holds = tracer.margins(rest, points).stable > STABILITY_MARGIN
             # More than this formation touches, or links meet, at the ends.
             holds[0] = holds[-1] = False
-            for middle in _middles(holds):
-                z = piece.points[middle]
+            for place in self._places(holds):
+                z = points[place]
                 heading = self._opening(rest, pair, z)
                 if heading is None:
                     continue
                 region = self._enter(z, Departure(rest, heading, frozenset({pair})))
                 if region is not None:
                     yield z, region
+
+    def _samples(self, piece: Piece) -> FloatArray:
+        """Points of a curve, shape (s, 3 + n), where contacts may open."""
+        return piece.points
+
+    def _places(self, holds: BoolArray) -> list[int]:
+        """Indices of points at which to open a contact, where the rest holds the object."""
+        return _middles(holds)
 
     def _opening(self, rest: Formation, pair: int, z: FloatArray) -> FloatArray | None:
         """Direction in which a gap opens fastest while the other contacts are kept."""

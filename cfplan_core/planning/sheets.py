@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.system import IntArray
+from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.events import EventKind
 from cfplan_core.planning.joint_grid import JointGrid, Place
-from cfplan_core.planning.manifold import independent_rows
+from cfplan_core.planning.manifold import independent_rows, project
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.regions import Regions, _heading
 from cfplan_core.planning.sheet_filling import Table, fill
@@ -104,6 +104,34 @@ class Sheets(Regions):
             if len(split_by_class(tracer, region.formation, trace.points)) == 1:
                 region.links.append((trace.end, trace.points))
                 yield trace.end
+
+    def _samples(self, piece: Piece) -> FloatArray:
+        """Points of a curve and three more between any two of them."""
+        if piece.dimension != 1:
+            return piece.points
+        tracer, pairs = self._roadmap.tracer, piece.formation.array
+        before, after = piece.points[:-1], piece.points[1:]
+        gradients = tracer.gradients(before, pairs)
+        rows = list(independent_rows(gradients[len(before) // 2]))
+        bases = np.linalg.svd(gradients[:, rows])[2][:, len(rows) :]
+        parts = [before]
+        for fraction in (0.25, 0.5, 0.75):
+            guesses = before + fraction * (after - before)
+            found = project(tracer.system, pairs[rows], before, bases, guesses)
+            parts.append(np.where(found.converged[:, None], found.points, before))
+        between = np.stack(parts, axis=1).reshape(-1, piece.points.shape[1])
+        return np.concatenate([between, piece.points[-1:]])
+
+    def _places(self, holds: BoolArray) -> list[int]:
+        """First, middle and last of every run of points where the rest holds the object."""
+        bounds = np.flatnonzero(np.diff(np.concatenate([[0], holds.astype(int), [0]])))
+        return sorted(
+            {
+                place
+                for first, end in bounds.reshape(-1, 2).tolist()
+                for place in (first, (first + end - 1) // 2, end - 1)
+            }
+        )
 
     def _merge(self, formation: Formation, z: FloatArray, inward: FloatArray) -> Region | None:
         return self._join(formation, z, inward)
