@@ -46,6 +46,7 @@ setup(
         'jsonschema>=4.10',
         'matplotlib>=3.6',
         'mcap>=1.5',
+        'networkx>=2.8',
         'numpy>=1.26',
         'pillow>=10.0',
         'pyyaml>=6.0',

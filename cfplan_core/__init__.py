@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from cfplan_core.errors import Finding as Finding
     from cfplan_core.errors import InvalidPlanError as InvalidPlanError
     from cfplan_core.errors import InvalidProblemError as InvalidProblemError
+    from cfplan_core.exploration import Exploration as Exploration
+    from cfplan_core.exploration import explore as explore
     from cfplan_core.model import Finger as Finger
     from cfplan_core.model import Goal as Goal
     from cfplan_core.model import Grasp as Grasp
@@ -45,6 +47,7 @@ __version__ = '0.1.0'
 
 _HOMES = {
     'errors': ('CfplanError', 'Finding', 'InvalidPlanError', 'InvalidProblemError'),
+    'exploration': ('Exploration', 'explore'),
     'model': (
         'Finger',
         'Goal',

@@ -11,6 +11,9 @@ import numpy as np
 from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import is_flat, signed_area
 
+RESOLUTION = 0.05
+"""Spacing of the grid of joint angles that regions are filled over unless asked otherwise, rad."""
+
 
 class Preference(str, Enum):
     """Which of several plans is the best; `docs/optimality.md` says how each is measured."""
@@ -28,6 +31,9 @@ class PlanOptions:
     Attributes:
         time_budget: Seconds, or None for no limit.
         max_nodes: Nodes of both trees together, or None for no limit.
+        resolution: Spacing of the grid of joint angles, rad, over which contact formations of
+            dimension 2 are explored; for hands of two joints. With constraints, preferences or
+            alternatives they are explored along rays instead.
         max_needed_force: Largest force, in weights of the object, that the contacts may need to
             hold it in any frame of the plan, or None for no limit.
         max_contacts: Largest number of contacts in any configuration that is passed through, also
@@ -44,6 +50,7 @@ class PlanOptions:
 
     time_budget: float | None = None
     max_nodes: int | None = None
+    resolution: float = RESOLUTION
     max_needed_force: float | None = None
     max_contacts: int | None = None
     forbidden: tuple[tuple[str, ...], ...] = ()
@@ -64,6 +71,8 @@ class PlanOptions:
             raise CfplanError(f'time_budget: got {self.time_budget}, expected seconds above zero')
         if self.max_nodes is not None and not self.max_nodes > 0:
             raise CfplanError(f'max_nodes: got {self.max_nodes}, expected a number above zero')
+        if not 1e-3 <= self.resolution <= 1.0:
+            raise CfplanError(f'resolution: got {self.resolution}, expected 0.001 to 1 rad')
         force = self.max_needed_force
         if force is not None and not (math.isfinite(force) and force > 0.0):
             raise CfplanError(f'max_needed_force: got {force}, expected weights above zero')

@@ -17,7 +17,12 @@ from cfplan_core.model import Goal, Problem
 from cfplan_core.options import PlanOptions as PlanOptions
 from cfplan_core.options import Preference
 from cfplan_core.planning.best_first import BestFirst
-from cfplan_core.planning.constraints import REASONS, compile_constraints, contradictions
+from cfplan_core.planning.constraints import (
+    REASONS,
+    UNCONSTRAINED,
+    compile_constraints,
+    contradictions,
+)
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.manifold import settle
@@ -112,7 +117,10 @@ class _Planning:
         if self.options.held_joints:
             self.moving = HeldSystem(self.system, self.options.held_joints, start)
             start = self.moving.reduced(start)
-        self.roadmap = Roadmap(self.moving, self.model, self._checkpoint, constraints)
+        # Sheets know of no constraint, and the search for the best plan moves straight.
+        plain = constraints == UNCONSTRAINED and self.moving is self.system
+        resolution = self.options.resolution if plain and not self.options.optimal else None
+        self.roadmap = Roadmap(self.moving, self.model, self._checkpoint, constraints, resolution)
         goal: FloatArray | GoalTest
         try:
             if examined.goal is not None:
@@ -284,7 +292,6 @@ class _Planning:
 
     def _doubt(self) -> str:
         """How far an answer of no path is short of a proof."""
-        regions = sum(piece.dimension > 1 for piece in self.roadmap.pieces)
         blocked = self.roadmap.failures[TOO_WEAK]
         doubt = ''
         if blocked:
@@ -293,12 +300,8 @@ class _Planning:
             count = sum(n for reason, n in self.roadmap.failures.items() if reason.endswith(why))
             if count:
                 doubt += f'. Not followed, as {why}: {count} ways'
-        if not regions:
-            return doubt
-        return doubt + (
-            '. Contact formations of dimension 0 and 1 were searched completely, '
-            f'{regions} regions of dimension 2 and more only along rays'
-        )
+        coverage = self.roadmap.regions.coverage()
+        return f'{doubt}. {coverage[0].upper()}{coverage[1:]}'
 
     def _answer(self, status: Status, message: str) -> PlanResult:
         trees = self.search.trees if self.search is not None else ()

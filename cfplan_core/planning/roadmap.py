@@ -18,11 +18,13 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
+from cfplan_core.options import RESOLUTION
 from cfplan_core.planning.constraints import UNCONSTRAINED, Constraints
 from cfplan_core.planning.events import OPEN_EVENTS
 from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
 from cfplan_core.planning.pieces import SAME, Junction, Piece
 from cfplan_core.planning.regions import Regions
+from cfplan_core.planning.sheets import Sheets
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STEP, Trace, Tracer, classify
 from cfplan_core.planning.transitions import Departure, Surroundings, departures, surroundings
@@ -44,6 +46,7 @@ class Roadmap:
         model: ContactModel,
         checkpoint: Callable[[], None] = lambda: None,
         constraints: Constraints = UNCONSTRAINED,
+        resolution: float | None = RESOLUTION,
     ) -> None:
         """Start empty.
 
@@ -52,6 +55,8 @@ class Roadmap:
             model: Mechanics.
             checkpoint: Called before every stretch of work; may raise to interrupt.
             constraints: What every configuration must keep, besides stability.
+            resolution: Spacing of the grid that regions of hands with two joints are filled over,
+                rad; None to explore them along rays, as they are with constraints.
         """
         self.system = system
         self.model = model
@@ -63,7 +68,11 @@ class Roadmap:
         self._junctions: list[Junction] = []
         self._cells: dict[tuple[int, ...], list[Junction]] = {}
         self._curves: dict[Formation, list[Piece]] = {}
-        self.regions = Regions(self)
+        self.regions: Regions = (
+            Regions(self)
+            if resolution is None or system.joint_count != 2
+            else Sheets(self, resolution)
+        )
 
     def formations(self) -> int:
         """Count the distinct contact formations that were met."""
