@@ -19,7 +19,6 @@ from cfplan_core.options import Preference
 from cfplan_core.planning.best_first import BestFirst
 from cfplan_core.planning.constraints import (
     REASONS,
-    UNCONSTRAINED,
     compile_constraints,
     contradictions,
 )
@@ -118,7 +117,7 @@ class _Planning:
             self.moving = HeldSystem(self.system, self.options.held_joints, start)
             start = self.moving.reduced(start)
         # Sheets know of no constraint, and the search for the best plan moves straight.
-        plain = constraints == UNCONSTRAINED and self.moving is self.system
+        plain = constraints.none and self.moving is self.system
         resolution = self.options.resolution if plain and not self.options.optimal else None
         self.roadmap = Roadmap(self.moving, self.model, self._checkpoint, constraints, resolution)
         goal: FloatArray | GoalTest

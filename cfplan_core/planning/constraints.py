@@ -47,6 +47,11 @@ class Constraints:
     forbidden: tuple[frozenset[int], ...] = ()
     required: tuple[frozenset[int], ...] = ()
 
+    @property
+    def none(self) -> bool:
+        """True if nothing is constrained."""
+        return self.max_contacts is None and not (self.bounds or self.forbidden or self.required)
+
     def refusal(self, pairs: IntArray, together: BoolArray) -> str | None:
         """Say why a configuration may not be passed through, not even in an instant.
 
