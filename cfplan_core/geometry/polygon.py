@@ -48,6 +48,18 @@ def centroid(vertices: FloatArray) -> FloatArray:
     return np.asarray(origin + (p + q).T @ cross / (3.0 * cross.sum()))
 
 
+def second_moment(vertices: FloatArray) -> float:
+    """Polar second moment of a polygon's area about its centroid, m⁴.
+
+    Args:
+        vertices: Shape (n, 2), m, counter-clockwise.
+    """
+    p = vertices - centroid(vertices)
+    q = np.roll(p, -1, axis=0)
+    cross = p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1]
+    return float((cross * (p * p + p * q + q * q).sum(axis=1)).sum() / 12.0)
+
+
 def diameter(vertices: FloatArray) -> float:
     """Largest distance between two vertices, m: the length by which tests are scaled."""
     n = len(vertices)
