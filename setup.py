@@ -73,6 +73,7 @@ setup(
         'cfplan.commands': [
             'bag = cfplan_ros.command_line.bag:bag',
             'call = cfplan_ros.command_line.call:call',
+            'execute = cfplan_ros.command_line.execute:execute',
             'node = cfplan_ros.command_line.node:node',
             'recover = cfplan_ros.command_line.recover:recover',
         ],

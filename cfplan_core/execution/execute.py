@@ -52,9 +52,7 @@ class ExecutionOptions:
         if not 1e-5 <= self.time_step <= 5e-3:
             raise CfplanError(f'time_step: got {self.time_step}, expected 1e-05 to 0.005 s')
         if not self.time_step <= self.sampling <= 1.0:
-            raise CfplanError(
-                f'sampling: got {self.sampling}, expected {self.time_step} to 1 s'
-            )
+            raise CfplanError(f'sampling: got {self.sampling}, expected {self.time_step} to 1 s')
         if self.seed < 0:
             raise CfplanError(f'seed: got {self.seed}, expected a whole number from 0')
 
@@ -126,9 +124,7 @@ class Executor:
         stiffness = options.gain if options.gain is not None else _STIFFNESS * unit
         inertia = problem.object.mass * self.system.size**2
         damping = 2.0 * _DAMPING_RATIO * np.sqrt(stiffness * inertia)
-        self.gains = Gains(
-            np.full(joints, stiffness), np.zeros(joints), np.full(joints, damping)
-        )
+        self.gains = Gains(np.full(joints, stiffness), np.zeros(joints), np.full(joints, damping))
         self.reference = build_reference(
             self.system,
             result,

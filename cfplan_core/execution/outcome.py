@@ -8,7 +8,7 @@ import numpy as np
 
 from cfplan_core.contact.elements import parse_contact
 from cfplan_core.contact.gaps import gaps
-from cfplan_core.contact.system import BoolArray, ContactSystem
+from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray
 from cfplan_core.execution.feedforward import segment_gradients
 from cfplan_core.execution.reference import Reference
 from cfplan_core.execution.simulation import Run
@@ -139,14 +139,14 @@ def _touching(system: ContactSystem, run: Run) -> tuple[BoolArray, BoolArray]:
 def _losses(
     system: ContactSystem,
     result: PlanResult,
-    segments: np.ndarray,
+    segments: IntArray,
     times: FloatArray,
     touching: BoolArray,
 ) -> tuple[tuple[ContactEvent, ...], tuple[float, ...]]:
     lost, kept = [], []
     for k, segment in enumerate(result.segments):
         inside = np.flatnonzero(segments == k)
-        pairs = [system.pair(parse_contact(name)) for name in segment.contacts]
+        pairs = np.array([system.pair(parse_contact(name)) for name in segment.contacts])
         holds = touching[np.ix_(inside, pairs)]
         kept.append(float(holds.all(axis=1).mean()) if len(inside) else 1.0)
         for column, name in enumerate(segment.contacts):
@@ -159,7 +159,7 @@ def _losses(
 def _made(
     system: ContactSystem,
     result: PlanResult,
-    segments: np.ndarray,
+    segments: IntArray,
     run: Run,
     near: BoolArray,
 ) -> tuple[ContactEvent, ...]:
@@ -172,9 +172,7 @@ def _made(
         beside = result.segments[max(0, k - 1) : k + 2]
         known = {name for other in (segment, *beside) for name in other.contacts}
         # On a vertex the engine's contact belongs to either edge.
-        known_pairs = {
-            (vertex[p], body[p]) for p, name in enumerate(names) if name in known
-        }
+        known_pairs = {(vertex[p], body[p]) for p, name in enumerate(names) if name in known}
         for p, name in enumerate(names):
             if name in known or (vertex[p], body[p]) in known_pairs:
                 continue
@@ -187,7 +185,7 @@ def _made(
 def _torque_excess(
     planned: ContactSystem,
     result: PlanResult,
-    segments: np.ndarray,
+    segments: IntArray,
     reference: Reference,
     run: Run,
 ) -> FloatArray:

@@ -95,9 +95,7 @@ def draw(problem: Problem, uncertainty: Uncertainty, generator: np.random.Genera
     fingers = tuple(
         replace(
             finger,
-            links=tuple(
-                replace(link, vertices=disturbed(link.vertices)) for link in finger.links
-            ),
+            links=tuple(replace(link, vertices=disturbed(link.vertices)) for link in finger.links),
         )
         for finger in problem.hand.fingers
     )

@@ -74,7 +74,9 @@ def build_reference(
     )
 
 
-def _cubics(times: FloatArray, values: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _cubics(
+    times: FloatArray, values: FloatArray, at: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Values and slopes of the cubics that a controller puts through a plan's frames."""
     if len(times) < 2:
         return np.repeat(values, len(at), axis=0), np.zeros((len(at), values.shape[1]))

@@ -23,7 +23,7 @@ from cfplan_core.geometry.polygon import FloatArray, centroid, second_moment, si
 from cfplan_core.model import Problem
 
 # Radius of the balls and half the thickness of the bodies, in sizes of the object.
-_RADIUS = 0.004
+_RADIUS = 0.0003
 _HALF_THICKNESS = 0.25
 # Inertia of a joint's drive, and mass of a link that the problem gives none, in those of the
 # object: m L² and m.
@@ -84,7 +84,6 @@ def build_scene(problem: Problem, time_step: float, friction: float = 0.0) -> Sc
     Raises:
         CfplanError: MuJoCo is not installed or refuses the model.
     """
-    mujoco = import_mujoco()
     spec = build_spec(problem, time_step, friction)
     try:
         model = spec.compile()
@@ -205,7 +204,7 @@ class _Builder:
             self._add_piece(body, name, piece)
             names.append(name)
         self.pieces.append(names)
-        for k in np.flatnonzero(self.system.convex[first : first + len(vertices)]):
+        for k in np.flatnonzero(self.system.convex[first : first + len(vertices)]).tolist():
             body.add_geom(
                 name=f'vertex {first + k}',
                 type=self.mujoco.mjtGeom.mjGEOM_SPHERE,

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 
+from cfplan_core.contact.system import IntArray
 from cfplan_core.execution.reference import Reference
 from cfplan_core.execution.scene import Scene, import_mujoco
 from cfplan_core.geometry.polygon import FloatArray
@@ -45,7 +48,7 @@ class Run:
     """
 
     times: FloatArray
-    rows: FloatArray
+    rows: IntArray
     object_poses: FloatArray
     joints: FloatArray
     joint_velocities: FloatArray
@@ -91,7 +94,7 @@ def simulate(
     data.ctrl[:] = commands[0]
     _settle(mujoco, model, data)
 
-    rows = np.arange(0, len(reference.times), every)
+    rows: IntArray = np.arange(0, len(reference.times), every)
     count = len(rows)
     recorder = _Recorder(scene, count, n)
     for row in range(len(reference.times)):
@@ -100,7 +103,7 @@ def simulate(
         data.ctrl[:] = commands[row]
         mujoco.mj_step(model, data)
         if row % every == 0:
-            recorder.note(mujoco, data)
+            recorder.note(data)
     return Run(
         reference.times[rows],
         rows,
@@ -112,7 +115,7 @@ def simulate(
     )
 
 
-def _settle(mujoco: object, model: object, data: object) -> None:
+def _settle(mujoco: ModuleType, model: Any, data: Any) -> None:
     inertia = np.array([model.body_mass[1], model.body_mass[1], model.body_inertia[1, 2]])
     before = model.dof_damping[:3].copy()
     model.dof_damping[:3] = inertia / _SETTLING_CONSTANT
@@ -132,7 +135,7 @@ class _Recorder:
         self.forces = np.zeros((count, vertices, int(scene.body_of_geom.max()) + 1))
         self.next = 0
 
-    def note(self, mujoco: object, data: object) -> None:
+    def note(self, data: Any) -> None:
         k, scene = self.next, self.scene
         self.next += 1
         self.poses[k] = data.qpos[:3]
