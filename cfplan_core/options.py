@@ -15,6 +15,10 @@ RESOLUTION = 0.05
 """Spacing of the grid of joint angles that regions are filled over unless asked otherwise, rad."""
 
 
+SQUEEZE = 5.0
+"""Largest contact force of nominal torques unless asked otherwise, weights of the object."""
+
+
 class Preference(str, Enum):
     """Which of several plans is the best; `docs/optimality.md` says how each is measured."""
 
@@ -22,6 +26,23 @@ class Preference(str, Enum):
     FEWEST_SEGMENTS = 'fewest-segments'
     SHORTEST = 'shortest'
     ROBUST = 'robust'
+
+
+@dataclass(frozen=True)
+class TrajectoryOptions:
+    """How a path becomes a trajectory.
+
+    Attributes:
+        squeeze: Largest contact force, in weights of the object, that the nominal torques press
+            with where that is a choice: in form closure they could press ever harder. Where the
+            contacts need more than two thirds of it, half as much again as they need.
+    """
+
+    squeeze: float = SQUEEZE
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.squeeze) and self.squeeze > 0.0):
+            raise CfplanError(f'squeeze: got {self.squeeze}, expected weights above zero')
 
 
 @dataclass(frozen=True)
@@ -46,6 +67,7 @@ class PlanOptions:
         prefer: Which plan to choose; unless it is the first one found, the search goes on until no
             better one can exist or a budget is exhausted.
         alternatives: Number of plans wanted, with different sequences of contact formations.
+        trajectory: How the path becomes a trajectory.
     """
 
     time_budget: float | None = None
@@ -59,6 +81,7 @@ class PlanOptions:
     stay_within: tuple[tuple[float, float], ...] | None = None
     prefer: Preference = Preference.FIRST
     alternatives: int = 1
+    trajectory: TrajectoryOptions = TrajectoryOptions()
 
     @property
     def optimal(self) -> bool:

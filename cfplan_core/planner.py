@@ -16,6 +16,7 @@ from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Goal, Problem
 from cfplan_core.options import PlanOptions as PlanOptions
 from cfplan_core.options import Preference
+from cfplan_core.options import TrajectoryOptions as TrajectoryOptions
 from cfplan_core.planning.best_first import BestFirst
 from cfplan_core.planning.constraints import (
     REASONS,
@@ -146,7 +147,7 @@ class _Planning:
 
     def _solved(self, legs: Sequence[Leg], message: str) -> PlanResult:
         """The answer for a path, with the trees of the search that found it."""
-        frames = build_frames(self.system, self.model, self._whole(legs))
+        frames = build_frames(self.system, self.model, self._whole(legs), self.options.trajectory)
         return replace(
             self._answer(Status.SOLVED, message),
             times=frames.times,
@@ -158,6 +159,8 @@ class _Planning:
             reversible=self.model.reversible,
             entry_lower=frames.entry_lower,
             entry_upper=frames.entry_upper,
+            torque_nominal=frames.torque_nominal,
+            entry_nominal=frames.entry_nominal,
         )
 
     def _free_goal(self) -> Goal:

@@ -79,6 +79,15 @@ class ContactModel(Protocol):
         Unlike `torque_limits` this asks for all joints at once.
         """
 
+    def nominal_torques(
+        self, gradients: FloatArray, lower: FloatArray, upper: FloatArray, squeeze: float
+    ) -> FloatArray:
+        """Torques, shape (s, n), in the middle of those that keep all contacts.
+
+        Within limits of shape (s, n), without the links' weight, and pressing with contact forces
+        of at most `squeeze` weights where the contacts leave a choice.
+        """
+
     def needed_forces(self, gradients: FloatArray) -> FloatArray:
         """Smallest F with an equilibrium in which no contact force exceeds F; shape (s,).
 

@@ -15,6 +15,7 @@ import numpy as np
 from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.errors import JammedError
 from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.central_forces import central_forces
 from cfplan_core.mechanics.closure import span_margin, span_margins
 from cfplan_core.mechanics.contact_model import Margins, Motion
 from cfplan_core.mechanics.needed_force import needed_forces
@@ -98,6 +99,14 @@ class FrictionlessModel:
             )
             holds[index] = found.status == 0
         return holds
+
+    def nominal_torques(
+        self, gradients: FloatArray, lower: FloatArray, upper: FloatArray, squeeze: float
+    ) -> FloatArray:
+        """Torques at the Chebyshev centre of the equilibria, see `central_forces`."""
+        w, arms = gradients[..., :3], -gradients[..., 3:]
+        forces = central_forces(w, arms, self.load, (lower, upper), squeeze)
+        return np.asarray(np.einsum('sk,skn->sn', forces, arms))
 
     def needed_forces(self, gradients: FloatArray) -> FloatArray:
         """Smallest possible largest contact force, in weights, of each configuration."""

@@ -11,6 +11,7 @@ from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
+from cfplan_core.options import TrajectoryOptions
 from cfplan_core.planning.bounds import Bound
 from cfplan_core.planning.manifold import independent_rows, project
 from cfplan_core.planning.search import Leg
@@ -18,6 +19,7 @@ from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
 from cfplan_core.trajectory.plan_result import Segment
 from cfplan_core.trajectory.timing import frame_times
+from cfplan_core.trajectory.torque_profile import TorqueProfile
 
 # Largest change between frames of a joint or of the object's angle, in rad, and of its position,
 # in object sizes. The format cfplan/plan/1 allows 0.05 of each; half of that for the position
@@ -42,6 +44,8 @@ class Frames:
     segments: tuple[Segment, ...]
     entry_lower: FloatArray
     entry_upper: FloatArray
+    torque_nominal: FloatArray
+    entry_nominal: FloatArray
 
 
 def overloaded_legs(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> list[int]:
@@ -71,7 +75,12 @@ def straying_legs(
     return straying
 
 
-def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> Frames:
+def build_frames(
+    system: ContactSystem,
+    model: ContactModel,
+    legs: Sequence[Leg],
+    options: TrajectoryOptions = TrajectoryOptions(),  # noqa: B008 - it is immutable
+) -> Frames:
     """Sample a path into frames.
 
     A frame shared by two segments carries the torque limits of the earlier one. Times follow from
@@ -81,7 +90,9 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
         system: Compiled problem.
         model: Gives the torque limits.
         legs: From start to goal, each beginning where the one before ends.
+        options: Of the torque profile.
     """
+    profile = TorqueProfile(system, model, options.squeeze)
     tracer = Tracer(system, model)
     points: list[FloatArray] = []
     lower: list[FloatArray] = []
@@ -100,12 +111,14 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
             segments.append(Segment(contacts, stability.value, first, last, needed))
             entry_lower.append(low[0])
             entry_upper.append(high[0])
+            profile.add(gradients, z, low, high)
             shared = 1 if points else 0
             points.append(z[shared:])
             lower.append(low[shared:])
             upper.append(high[shared:])
             first += len(z) - 1
     z = np.concatenate(points)
+    torque_nominal, entry_nominal = profile.joined()
     return Frames(
         frame_times(z[:, 3:], np.array([j.velocity_limit for j in system.problem.hand.joints])),
         z[:, 3:],
@@ -115,6 +128,8 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
         tuple(segments),
         np.array(entry_lower),
         np.array(entry_upper),
+        torque_nominal,
+        entry_nominal,
     )
 
 

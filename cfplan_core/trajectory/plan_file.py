@@ -41,7 +41,8 @@ def write_plan(result: PlanResult, path: str | os.PathLike[str]) -> None:
 def read_plan(path: str | os.PathLike[str]) -> PlanResult:
     """Read a plan file.
 
-    A frame's ``torque_nominal`` and a segment's ``control`` are checked and not kept.
+    A segment's ``control`` is checked and not kept, nor is ``torque_nominal`` if only some frames
+    have it.
 
     Args:
         path: A file of the format ``cfplan/plan/1``.
@@ -90,6 +91,8 @@ def _result(document: Document) -> PlanResult:
         rows = [[null if entry is None else entry for entry in frame[key]] for frame in frames]
         return np.array(rows, dtype=np.float64).reshape(len(frames), width)
 
+    planned = bool(frames) and all('torque_nominal' in frame for frame in frames)
+    nominal = column('torque_nominal', len(names)) if planned else np.empty((0, 0))
     return PlanResult(
         problem=document['problem'],
         status=Status(document['status']),
@@ -100,6 +103,7 @@ def _result(document: Document) -> PlanResult:
         object_poses=column('object_pose', 3),
         torque_lower=column('torque_lower', len(names), -math.inf),
         torque_upper=column('torque_upper', len(names), math.inf),
+        torque_nominal=nominal,
         segments=tuple(
             Segment(
                 contacts=tuple(segment['contacts']),
@@ -127,14 +131,15 @@ def _statistics(document: Document) -> Statistics:
 
 def _document(result: PlanResult, name: str) -> Document:
     count = len(result.times)
-    for key in ('joints', 'object_poses', 'torque_lower', 'torque_upper'):
+    for key in ('joints', 'object_poses', 'torque_lower', 'torque_upper', 'torque_nominal'):
         rows = len(getattr(result, key))
-        if rows != count:
+        if rows != count and (rows or key != 'torque_nominal'):
             raise _invalid(name, key, f'{rows} rows', f'{count} rows, one per entry of times')
 
     def limits(row: FloatArray, unbounded: float) -> list[float | None]:
         return [None if value == unbounded else value for value in row.tolist()]
 
+    nominal = len(result.torque_nominal) > 0
     statistics = result.statistics
     return {
         'format': FORMAT,
@@ -149,6 +154,7 @@ def _document(result: PlanResult, name: str) -> Document:
                 'object_pose': result.object_poses[k].tolist(),
                 'torque_lower': limits(result.torque_lower[k], -math.inf),
                 'torque_upper': limits(result.torque_upper[k], math.inf),
+                **({'torque_nominal': result.torque_nominal[k].tolist()} if nominal else {}),
             }
             for k in range(count)
         ],

@@ -103,6 +103,9 @@ class PlanResult:
         entry_lower: Shape (s, n), torque limits of each segment at its first frame, N·m, where
             the frame itself carries those of the segment before. Not in plan files.
         entry_upper: As `entry_lower`.
+        torque_nominal: Shape (f, n), N·m, what the actuators should supply: inside the limits,
+            with the widest margin. Empty where it was not planned.
+        entry_nominal: As `entry_lower`.
         margin: Worst robustness margin of the plan, where it was chosen among several, else None.
         alternatives: Other plans, the next best first, each without further ones.
     """
@@ -122,6 +125,8 @@ class PlanResult:
     reversible: bool = False
     entry_lower: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     entry_upper: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    torque_nominal: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    entry_nominal: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     margin: float | None = None
     alternatives: tuple[PlanResult, ...] = ()
 

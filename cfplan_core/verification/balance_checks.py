@@ -21,6 +21,7 @@ from cfplan_core.verification.statics import (
     internal_force,
     least_effort,
     smallest_singular_value,
+    torque_distance,
     torque_limits,
 )
 from cfplan_core.verification.touching import Pair, locate
@@ -138,6 +139,26 @@ def check_torques(holds: Sequence[Hold], claimed: Limits, inside: bool, record: 
     record.measure('torque_limits' if inside else 'torque_limits_at_ends', error, frame, what)
     what = 'least effort that holds the object, divided by the effort limits,'
     record.measure('effort', min(efforts), frame, what)
+
+
+def check_nominal(hold: Hold, claimed: Limits, torques: FloatArray, record: Recorder) -> None:
+    """Check that nominal torques are inside the limits, are possible, and balance the object.
+
+    Args:
+        hold: All contacts that may press: those of the segment, or of the two that share a frame.
+        claimed: The limits of the plan.
+        torques: Shape (n,), N·m, of the plan.
+        record: Where to.
+    """
+    joints, unit = hold.mechanism.problem.hand.joints, hold.balance.torque_unit
+    excess = np.maximum(claimed[0] - torques, torques - claimed[1]) / unit
+    for joint, torque, beyond in zip(joints, torques.tolist(), excess.tolist(), strict=True):
+        what = f'nominal torque of {joint.name}, {torque:.9g} N·m, excess over its limits'
+        record.measure('nominal_limits', max(beyond, 0.0), hold.frame, what)
+        what = f'nominal torque of {joint.name}, {torque:.9g} N·m, divided by its effort limit,'
+        record.measure('nominal_effort', abs(torque) / joint.effort_limit, hold.frame, what)
+    what = f'distance of the nominal torques from those that balance the contacts of {hold.owner}'
+    record.measure('nominal_balance', torque_distance(hold.balance, torques), hold.frame, what)
 
 
 def _torque_error(hold: Hold, claimed: Limits, found: Limits) -> tuple[float, str]:

@@ -87,6 +87,13 @@ CHECKS = {
     'stability_class': Rule('the stability class is the one claimed'),
     'torque_limits': Rule('torque limits inside segments: relative error', 1e-6),
     'torque_limits_at_ends': Rule('torque limits at the ends of segments: relative error', 1e-5),
+    'nominal_limits': Rule(
+        'nominal torques are inside the torque limits: excess / (weight × size)', 1e-9
+    ),
+    'nominal_balance': Rule(
+        'nominal torques balance the object: distance from equilibria / (weight × size)', 1e-5
+    ),
+    'nominal_effort': Rule('nominal torques / effort limit', 1.0 + 1e-9),
     'effort': Rule('the joints are strong enough: effort needed / effort limit', 1.0 + 1e-9),
     'between_gap': Rule('gaps half-way between frames / (lever × turn²)', 0.25),
     'between_motion': Rule('distance from half-way to the contacts / step', 0.25),

@@ -13,6 +13,7 @@ from cfplan_core.verification.balance_checks import (
     Limits,
     check_barely_stable,
     check_class,
+    check_nominal,
     check_stable,
     check_torques,
 )
@@ -79,7 +80,9 @@ def verify_plan(problem: Problem, result: PlanResult) -> VerificationReport:
         for frame in range(len(scenes)):
             sharing = [s for s in stretches if s.first <= frame <= s.last]
             claimed = result.torque_lower[frame], result.torque_upper[frame]
-            _check_frame(mechanism, sharing, frame, scenes, claimed, events, record)
+            pressing = _check_frame(mechanism, sharing, frame, scenes, claimed, events, record)
+            if len(result.torque_nominal):
+                check_nominal(pressing, claimed, result.torque_nominal[frame], record)
     return record.report(problem.name, len(result.times))
 
 
@@ -91,7 +94,8 @@ def _check_frame(
     claimed: Limits,
     events: Events,
     record: Recorder,
-) -> None:
+) -> Hold:
+    """Check a frame; return what may press there."""
     scene = scenes[frame]
     for stretch in sharing:
         check_named_contacts(stretch, frame, scene, record)
@@ -114,6 +118,11 @@ def _check_frame(
         owner = ' and '.join(hold.owner for hold in holds)
         check_stable(Hold(mechanism, frame, scene, tuple(together), owner, weakest), record)
     check_torques(holds, claimed, inside, record)
+    if len(holds) == 1:
+        return holds[0]
+    pressing = dict.fromkeys(pair for hold in holds for pair in hold.contacts)
+    owner = ' and '.join(hold.owner for hold in holds)
+    return Hold(mechanism, frame, scene, tuple(pressing), owner, only.stability)
 
 
 def _check_steps(

@@ -113,6 +113,21 @@ def test_file_has_the_keys_of_the_format_in_its_order(result: PlanResult, tmp_pa
     assert [list(segment) for segment in document['segments']] == [segment_keys] * 2
 
 
+def test_nominal_torques_read_back_as_written(result: PlanResult, tmp_path: Path) -> None:
+    planned = replace(result, torque_nominal=np.arange(8.0).reshape(4, 2) / 7.0)
+    write_plan(planned, tmp_path / 'plan.json')
+    back = read_plan(tmp_path / 'plan.json')
+    np.testing.assert_array_equal(back.torque_nominal, planned.torque_nominal)
+    assert equal(back, result)
+
+
+def test_a_plan_without_nominal_torques_reads_back_without(
+    result: PlanResult, tmp_path: Path
+) -> None:
+    write_plan(result, tmp_path / 'plan.json')
+    assert read_plan(tmp_path / 'plan.json').torque_nominal.shape == (0, 0)
+
+
 def test_unbounded_torque_is_null(result: PlanResult, tmp_path: Path) -> None:
     write_plan(result, tmp_path / 'plan.json')
     frame = json.loads((tmp_path / 'plan.json').read_text(encoding='utf-8'))['frames'][0]
