@@ -9,7 +9,7 @@ import numpy as np
 
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.errors import CfplanError
-from cfplan_core.execution.feedforward import least_torques
+from cfplan_core.execution.feedforward import planned_torques
 from cfplan_core.execution.outcome import Outcome, Tolerance, assess
 from cfplan_core.execution.perturbation import Uncertainty, World, draw
 from cfplan_core.execution.reference import Reference, build_reference
@@ -128,7 +128,7 @@ class Executor:
         self.reference = build_reference(
             self.system,
             result,
-            least_torques(self.system, result),
+            planned_torques(self.system, result),
             np.ones((len(result.segments), joints), dtype=bool),
             options.time_step,
             _REST,

@@ -45,3 +45,21 @@ def least_torques(system: ContactSystem, result: PlanResult) -> tuple[FloatArray
         pushed = -np.einsum('skn,sk->sn', gradients[..., 3:], forces)
         torques.append((pushed + system.link_weight_torques(z)) * system.force_unit * system.size)
     return tuple(torques)
+
+
+def planned_torques(system: ContactSystem, result: PlanResult) -> tuple[FloatArray, ...]:
+    """Nominal torques of the plan; of one without, as `least_torques`.
+
+    Returns:
+        For each segment shape (f, n), N·m. At its first frame those with which it is entered,
+        where the plan still knows them; a plan file does not.
+    """
+    if not len(result.torque_nominal):
+        return least_torques(system, result)
+    torques = []
+    for k, segment in enumerate(result.segments):
+        own = result.torque_nominal[segment.first_frame : segment.last_frame + 1].copy()
+        if len(result.entry_nominal):
+            own[0] = result.entry_nominal[k]
+        torques.append(own)
+    return tuple(torques)

@@ -2,10 +2,12 @@
 
 The model is planar: its object slides along x and y and turns about z, its links turn about z.
 Contact is possible exactly where the planner considers it, between a vertex of one body and the
-edges of another. Each vertex that can touch is a small ball, each body that can be touched an
-extruded polygon, shrunk by the ball's radius: ball and polygon meet where vertex and edge would,
-and a contact of the engine is one elemental contact. Only a vertex that leaves an edge at its end
-feels the difference, as if that end were rounded by the ball's radius.
+edges of another. Bodies are polygons whose corners are rounded, by a radius so small that a corner
+moves by a few ten thousandths of the object's size; edges stay where they are. The body's outline
+shrunk by the radius is collided with balls of twice the radius at the shrunk outline's vertices of
+the other: so a contact of the engine is one elemental contact, and as nothing ever overlaps, its
+direction is right also where a vertex passes a vertex. Exact corners would have to overlap there,
+and the engine would push them out through either edge.
 """
 
 from __future__ import annotations
@@ -22,8 +24,8 @@ from cfplan_core.geometry.convex_pieces import convex_pieces, shrunk
 from cfplan_core.geometry.polygon import FloatArray, centroid, second_moment, signed_area
 from cfplan_core.model import Problem
 
-# Radius of the balls and half the thickness of the bodies, in sizes of the object.
-_RADIUS = 0.0003
+# Radius of the corners and half the thickness of the bodies, in sizes of the object.
+_RADIUS = 5e-4
 _HALF_THICKNESS = 0.25
 # Inertia of a joint's drive, and mass of a link that the problem gives none, in those of the
 # object: m L² and m.
@@ -173,18 +175,22 @@ class _Builder:
         """Let every vertex collide with every body that the planner lets it touch."""
         system = self.system
         touched = system.body_of[system.pair_edge]
-        for vertex, body in dict.fromkeys(
+        vertex_bodies = dict.fromkeys(
             zip(system.pair_vertex.tolist(), touched.tolist(), strict=True)
-        ):
+        )
+        for vertex, body in vertex_bodies:
             for piece in self.pieces[body]:
-                self.spec.add_pair(
-                    geomname1=f'vertex {vertex}',
-                    geomname2=piece,
-                    condim=3 if friction else 1,
-                    friction=[friction, friction, 0.0, 0.0, 0.0],
-                    solref=[time_constant, 1.0],
-                    solimp=_IMPEDANCE,
-                )
+                self._add_pair(f'vertex {vertex}', piece, friction, time_constant)
+
+    def _add_pair(self, first: str, second: str, friction: float, time_constant: float) -> None:
+        self.spec.add_pair(
+            geomname1=first,
+            geomname2=second,
+            condim=3 if friction else 1,
+            friction=[friction, friction, 0.0, 0.0, 0.0],
+            solref=[time_constant, 1.0],
+            solimp=_IMPEDANCE,
+        )
 
     def _add_mass(self, body: Any, vertices: FloatArray, mass: float, center: FloatArray) -> None:
         """Give a body its mass, with the inertia of a uniform plate of its outline."""
@@ -199,7 +205,8 @@ class _Builder:
         number = len(self.pieces)
         first = int(self.system.first_vertex[number])
         names = []
-        for k, piece in enumerate(convex_pieces(shrunk(vertices, self.radius))):
+        inner = shrunk(vertices, self.radius)
+        for k, piece in enumerate(convex_pieces(inner)):
             name = f'body {number} {k}'
             self._add_piece(body, name, piece)
             names.append(name)
@@ -208,8 +215,8 @@ class _Builder:
             body.add_geom(
                 name=f'vertex {first + k}',
                 type=self.mujoco.mjtGeom.mjGEOM_SPHERE,
-                size=[self.radius, 0.0, 0.0],
-                pos=[*vertices[k], 0.0],
+                size=[2.0 * self.radius, 0.0, 0.0],
+                pos=[*inner[k], 0.0],
                 contype=0,
                 conaffinity=0,
             )

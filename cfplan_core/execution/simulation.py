@@ -101,9 +101,12 @@ def simulate(
         if row in switching:
             switch(row)
         data.ctrl[:] = commands[row]
+        measured = row % every == 0
+        if measured:
+            recorder.note_state(data)
         mujoco.mj_step(model, data)
-        if row % every == 0:
-            recorder.note(data)
+        if measured:
+            recorder.note_forces(data)
     return Run(
         reference.times[rows],
         rows,
@@ -135,12 +138,16 @@ class _Recorder:
         self.forces = np.zeros((count, vertices, int(scene.body_of_geom.max()) + 1))
         self.next = 0
 
-    def note(self, data: Any) -> None:
+    def note_state(self, data: Any) -> None:
+        """Note where everything is, before a step."""
+        self.poses[self.next] = data.qpos[:3]
+        self.joints[self.next] = data.qpos[3:]
+        self.velocities[self.next] = data.qvel[3:]
+
+    def note_forces(self, data: Any) -> None:
+        """Note the forces that a step began with, after it."""
         k, scene = self.next, self.scene
         self.next += 1
-        self.poses[k] = data.qpos[:3]
-        self.joints[k] = data.qpos[3:]
-        self.velocities[k] = data.qvel[3:]
         self.torques[k] = data.actuator_force
         contact = data.contact
         if not len(contact.dist):
