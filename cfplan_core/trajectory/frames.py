@@ -108,10 +108,10 @@ def build_frames(
             contacts = system.contact_names(leg.formation.pairs)
             needed = float(model.needed_forces(gradients).max())
             last = first + len(z) - 1
-            segments.append(Segment(contacts, stability.value, first, last, needed))
+            control = profile.add(gradients, z, low, high)
+            segments.append(Segment(contacts, stability.value, first, last, needed, control))
             entry_lower.append(low[0])
             entry_upper.append(high[0])
-            profile.add(gradients, z, low, high)
             shared = 1 if points else 0
             points.append(z[shared:])
             lower.append(low[shared:])
