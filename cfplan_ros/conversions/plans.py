@@ -22,7 +22,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from cfplan_core.errors import Finding, InvalidPlanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.trajectory.plan_result import PlanResult, Segment, Statistics, Status
-from cfplan_core.trajectory.timing import joint_velocities
+from cfplan_core.trajectory.timing import joint_velocities, rest_frames
 from cfplan_core.trajectory.torque_profile import EFFORT, POSITION
 from cfplan_ros.conversions.contacts import contact_names, formation_message
 from cfplan_ros.conversions.poses import pose_message
@@ -99,7 +99,8 @@ def plan_message(result: PlanResult, frame_id: str, stamp: Time) -> Manipulation
         return message
     count = len(result.times)
     nanoseconds = whole_nanoseconds(result.times)
-    velocities = joint_velocities(nanoseconds / NANOSECONDS, result.joints)
+    rests = rest_frames(result.joints, result.segments)
+    velocities = joint_velocities(nanoseconds / NANOSECONDS, result.joints, rests)
     message.joint_trajectory.joint_names = list(result.joint_names)
     message.torque_limits.joint_names = list(result.joint_names)
     message.joint_trajectory.points = [
