@@ -21,7 +21,7 @@ import numpy as np
 from cfplan_core.contact.system import ContactSystem, IntArray
 from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.convex_pieces import convex_pieces, shrunk
-from cfplan_core.geometry.polygon import FloatArray, centroid, second_moment, signed_area
+from cfplan_core.geometry.polygon import FloatArray, centroid, second_moment
 from cfplan_core.model import Problem
 
 # Radius of the corners and half the thickness of the bodies, in sizes of the object.
@@ -194,7 +194,7 @@ class _Builder:
 
     def _add_mass(self, body: Any, vertices: FloatArray, mass: float, center: FloatArray) -> None:
         """Give a body its mass, with the inertia of a uniform plate of its outline."""
-        inertia = mass * second_moment(vertices) / signed_area(vertices)
+        inertia = mass * second_moment(vertices, center)
         body.explicitinertial = True
         body.mass = mass
         body.ipos = [*center, 0.0]

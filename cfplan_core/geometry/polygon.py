@@ -48,16 +48,18 @@ def centroid(vertices: FloatArray) -> FloatArray:
     return np.asarray(origin + (p + q).T @ cross / (3.0 * cross.sum()))
 
 
-def second_moment(vertices: FloatArray) -> float:
-    """Polar second moment of a polygon's area about its centroid, m⁴.
+def second_moment(vertices: FloatArray, about: FloatArray) -> float:
+    """Mean squared distance of a polygon's area from a point, m².
 
     Args:
-        vertices: Shape (n, 2), m, counter-clockwise.
+        vertices: Shape (n, 2), m; the area may not be zero.
+        about: Shape (2,), m.
     """
-    p = vertices - centroid(vertices)
+    p = vertices - about
     q = np.roll(p, -1, axis=0)
     cross = p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1]
-    return float((cross * (p * p + p * q + q * q).sum(axis=1)).sum() / 12.0)
+    squares = (p * p + p * q + q * q).sum(axis=1)
+    return float(squares @ cross / (6.0 * cross.sum()))
 
 
 def diameter(vertices: FloatArray) -> float:

@@ -12,6 +12,7 @@ from typing import NamedTuple, Protocol
 
 from cfplan_core.contact.system import BoolArray
 from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.control_roles import Roles
 
 
 class Stability(str, Enum):
@@ -53,6 +54,19 @@ class Motion(NamedTuple):
     unique: bool
 
 
+class Actuation(NamedTuple):
+    """How actuators hold the object along a stretch.
+
+    Attributes:
+        torques: Shape (s, n), in the middle of those that keep all contacts, without the links'
+            weight.
+        roles: Which joints to control in torque, the best choice first.
+    """
+
+    torques: FloatArray
+    roles: tuple[Roles, ...]
+
+
 class ContactModel(Protocol):
     """What the planner needs to know of mechanics."""
 
@@ -79,12 +93,12 @@ class ContactModel(Protocol):
         Unlike `torque_limits` this asks for all joints at once.
         """
 
-    def nominal_torques(
+    def actuation(
         self, gradients: FloatArray, lower: FloatArray, upper: FloatArray, squeeze: float
-    ) -> FloatArray:
-        """Torques, shape (s, n), in the middle of those that keep all contacts.
+    ) -> Actuation:
+        """Say how actuators should hold a stretch of motion inside one contact formation.
 
-        Within limits of shape (s, n), without the links' weight, and pressing with contact forces
+        With torques inside limits of shape (s, n), without the links' weight, and contact forces
         of at most `squeeze` weights where the contacts leave a choice.
         """
 

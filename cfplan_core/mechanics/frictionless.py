@@ -17,7 +17,8 @@ from cfplan_core.errors import JammedError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.central_forces import central_forces
 from cfplan_core.mechanics.closure import span_margin, span_margins
-from cfplan_core.mechanics.contact_model import Margins, Motion
+from cfplan_core.mechanics.contact_model import Actuation, Margins, Motion
+from cfplan_core.mechanics.control_roles import control_roles
 from cfplan_core.mechanics.needed_force import needed_forces
 
 _SINGULAR = 1e-12
@@ -100,13 +101,14 @@ class FrictionlessModel:
             holds[index] = found.status == 0
         return holds
 
-    def nominal_torques(
+    def actuation(
         self, gradients: FloatArray, lower: FloatArray, upper: FloatArray, squeeze: float
-    ) -> FloatArray:
-        """Torques at the Chebyshev centre of the equilibria, see `central_forces`."""
+    ) -> Actuation:
+        """Take the Chebyshev centre of all equilibria, see `central_forces`, and its roles."""
         w, arms = gradients[..., :3], -gradients[..., 3:]
         forces = central_forces(w, arms, self.load, (lower, upper), squeeze)
-        return np.asarray(np.einsum('sk,skn->sn', forces, arms))
+        torques = np.asarray(np.einsum('sk,skn->sn', forces, arms))
+        return Actuation(torques, control_roles(w, arms, forces))
 
     def needed_forces(self, gradients: FloatArray) -> FloatArray:
         """Smallest possible largest contact force, in weights, of each configuration."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from rich import box
 from rich.console import Console, Group, RenderableType
@@ -77,7 +79,9 @@ def _segment_table(result: PlanResult) -> Table:
     table = _new_table()
     table.add_column('No.', justify='right')
     table.add_column('Contacts', overflow='fold')
-    table.add_column('Stability,\nneeded force')
+    planned = any(segment.control is not None for segment in result.segments)
+    heading = 'Stability,\nneeded force' + (',\nby torque' if planned else '')
+    table.add_column(heading, overflow='fold')
     table.add_column('Frames', justify='right')
     table.add_column('Time (s)', justify='right')
     for k, segment in enumerate(result.segments):
@@ -85,7 +89,9 @@ def _segment_table(result: PlanResult) -> Table:
         table.add_row(
             str(k + 1),
             Text('\n'.join(segment.contacts)),
-            segment.stability.replace('_', ' ') + _needed(segment.needed_force),
+            segment.stability.replace('_', ' ')
+            + _needed(segment.needed_force)
+            + _torque_controlled(segment.control),
             f'{segment.first_frame} to {segment.last_frame}',
             f'{start:.2f} to {end:.2f}\n({end - start:.2f})',
             end_section=True,
@@ -116,6 +122,13 @@ def _needed(force: float | None) -> str:
     return '' if force is None else f'\n{force:.2f} weights'
 
 
+def _torque_controlled(control: Mapping[str, str] | None) -> str:
+    if control is None:
+        return ''
+    names = [name for name, role in control.items() if role == 'effort']
+    return '\n' + (', '.join(names) or 'none')
+
+
 def _joint_table(result: PlanResult, problem: Problem | None) -> Table:
     table = _new_table()
     table.add_column('Joint', overflow='fold')
@@ -136,7 +149,9 @@ def _joint_table(result: PlanResult, problem: Problem | None) -> Table:
 def _torque_table(result: PlanResult) -> Table:
     table = _new_table()
     table.add_column('Joint', overflow='fold')
-    for name in ('Range of lower limit', 'Range of upper limit', 'Narrowest interval'):
+    nominal = len(result.torque_nominal) > 0
+    columns = ['Range of lower limit', 'Range of upper limit', 'Narrowest interval']
+    for name in columns + ['Range of nominal torque'] * nominal:
         table.add_column(name, justify='right')
     for k, name in enumerate(result.joint_names):
         lower, upper = result.torque_lower[:, k], result.torque_upper[:, k]
@@ -146,6 +161,7 @@ def _torque_table(result: PlanResult) -> Table:
             _range(lower),
             _range(upper),
             f'{_torque(lower[narrowest])} to {_torque(upper[narrowest])}\nin frame {narrowest}',
+            *([_range(result.torque_nominal[:, k])] if nominal else []),
         )
     return table
 

@@ -8,17 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from cfplan_core.contact.gaps import gap_gradients
-from cfplan_core.contact.system import ContactSystem
+from cfplan_core.contact.system import BoolArray, ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
-from cfplan_core.options import TrajectoryOptions
+from cfplan_core.options import ACCELERATION, TrajectoryOptions
 from cfplan_core.planning.bounds import Bound
 from cfplan_core.planning.manifold import independent_rows, project
 from cfplan_core.planning.search import Leg
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
+from cfplan_core.trajectory.inertia import moving_masses
 from cfplan_core.trajectory.plan_result import Segment
-from cfplan_core.trajectory.timing import frame_times
+from cfplan_core.trajectory.timing import contact_events, frame_times, rest_frames
 from cfplan_core.trajectory.torque_profile import TorqueProfile
 
 # Largest change between frames of a joint or of the object's angle, in rad, and of its position,
@@ -84,13 +85,13 @@ def build_frames(
     """Sample a path into frames.
 
     A frame shared by two segments carries the torque limits of the earlier one. Times follow from
-    the joints' velocity limits (`frame_times`).
+    limits of velocity and acceleration (`frame_times`).
 
     Args:
         system: Compiled problem.
         model: Gives the torque limits.
         legs: From start to goal, each beginning where the one before ends.
-        options: Of the torque profile.
+        options: Of the torque profile and of the times.
     """
     profile = TorqueProfile(system, model, options.squeeze)
     tracer = Tracer(system, model)
@@ -108,10 +109,10 @@ def build_frames(
             contacts = system.contact_names(leg.formation.pairs)
             needed = float(model.needed_forces(gradients).max())
             last = first + len(z) - 1
-            segments.append(Segment(contacts, stability.value, first, last, needed))
+            control = profile.add(gradients, z, low, high)
+            segments.append(Segment(contacts, stability.value, first, last, needed, control))
             entry_lower.append(low[0])
             entry_upper.append(high[0])
-            profile.add(gradients, z, low, high)
             shared = 1 if points else 0
             points.append(z[shared:])
             lower.append(low[shared:])
@@ -120,7 +121,7 @@ def build_frames(
     z = np.concatenate(points)
     torque_nominal, entry_nominal = profile.joined()
     return Frames(
-        frame_times(z[:, 3:], np.array([j.velocity_limit for j in system.problem.hand.joints])),
+        _times(system, z, segments, options),
         z[:, 3:],
         system.object_poses(z),
         np.concatenate(lower),
@@ -131,6 +132,37 @@ def build_frames(
         torque_nominal,
         entry_nominal,
     )
+
+
+def _times(
+    system: ContactSystem,
+    z: FloatArray,
+    segments: Sequence[Segment],
+    options: TrajectoryOptions,
+) -> FloatArray:
+    """Times of the frames, which are all of the plan."""
+    hand, joints = system.problem.hand.joints, z[:, 3:]
+    masses, inertial = moving_masses(system, z, options.inertia)
+    path = np.concatenate([joints, masses], axis=1)
+    acceleration = [joint.acceleration_limit or ACCELERATION for joint in hand]
+    velocity = np.full(path.shape[1], np.inf)
+    velocity[: len(hand)] = [joint.velocity_limit for joint in hand]
+    pace = np.where(
+        _near_events(joints, segments, options.event_distance), options.event_speed, 1.0
+    )
+    limits = np.concatenate([acceleration, inertial])
+    rests = rest_frames(joints, segments)
+    return frame_times(path, len(hand), velocity, limits, rests, pace)
+
+
+def _near_events(joints: FloatArray, segments: Sequence[Segment], distance: float) -> BoolArray:
+    """Tell which steps come nearer than a distance along the path to a contact event, (f - 1,)."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(joints, axis=0), axis=1))])
+    near = np.zeros(len(joints) - 1, dtype=bool)
+    for event in contact_events(segments):
+        apart = np.abs(way - way[event])
+        near |= np.minimum(apart[1:], apart[:-1]) < distance
+    return near
 
 
 def _steps(system: ContactSystem, z: FloatArray) -> FloatArray:

@@ -41,8 +41,7 @@ def write_plan(result: PlanResult, path: str | os.PathLike[str]) -> None:
 def read_plan(path: str | os.PathLike[str]) -> PlanResult:
     """Read a plan file.
 
-    A segment's ``control`` is checked and not kept, nor is ``torque_nominal`` if only some frames
-    have it.
+    ``torque_nominal`` is checked and not kept if only some frames have it.
 
     Args:
         path: A file of the format ``cfplan/plan/1``.
@@ -111,6 +110,7 @@ def _result(document: Document) -> PlanResult:
                 first_frame=int(segment['first_frame']),
                 last_frame=int(segment['last_frame']),
                 needed_force=segment.get('needed_force'),
+                control=segment.get('control'),
             )
             for segment in document['segments']
         ),
@@ -179,6 +179,8 @@ def _segment(segment: Segment) -> Document:
     }
     if segment.needed_force is not None:
         document['needed_force'] = float(segment.needed_force)
+    if segment.control is not None:
+        document['control'] = dict(segment.control)
     return document
 
 

@@ -31,6 +31,8 @@ class Segment:
         last_frame: Index of the last frame; shared with the segment after.
         needed_force: Largest over its frames of the smallest F such that contact forces of at
             most F hold the object, in weights of the object; None if not known.
+        control: ``position`` or ``effort`` for each joint by name: which to hold stiffly where it
+            is to be, and which to give its nominal torque; None where it was not planned.
     """
 
     contacts: tuple[str, ...]
@@ -38,6 +40,7 @@ class Segment:
     first_frame: int
     last_frame: int
     needed_force: float | None = None
+    control: Mapping[str, str] | None = field(default=None, hash=False)
 
 
 @dataclass(frozen=True)

@@ -7,19 +7,29 @@ inside the limits of one segment and then of the other would have to pass that v
 middle τ_B of the other all contacts press, so at the event the nominal torque is τ_A +
 λ (τ_B − τ_A): squeezed or relaxed towards the next segment as far as the limits of the first one
 leave room, and no farther than the middle of what the limits of both allow.
+
+Which joints are controlled in torque, `cfplan_core.mechanics.control_roles` tells.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel
+from cfplan_core.mechanics.control_roles import Roles
 
 Limits = tuple[FloatArray, FloatArray]
 
+POSITION, EFFORT = 'position', 'effort'
+"""How a joint is controlled in a segment."""
+
 _STILL = 1e-12
+# A change of roles is a disturbance: they are kept while the margin is this share of the best.
+_KEPT = 0.5
 
 
 class TorqueProfile:
@@ -39,10 +49,13 @@ class TorqueProfile:
         self._unit = system.force_unit * system.size
         joints = system.problem.hand.joints
         self._effort = np.array([joint.effort_limit for joint in joints])
+        self._effort_joints: tuple[int, ...] = ()
         self._middles: list[FloatArray] = []
         self._limits: list[tuple[Limits, Limits]] = []
 
-    def add(self, gradients: FloatArray, z: FloatArray, low: FloatArray, high: FloatArray) -> None:
+    def add(
+        self, gradients: FloatArray, z: FloatArray, low: FloatArray, high: FloatArray
+    ) -> dict[str, str]:
         """Append a segment.
 
         Args:
@@ -50,10 +63,13 @@ class TorqueProfile:
             z: Shape (s, 3 + n).
             low: Shape (s, n), torque limits with the links' weight, N·m.
             high: As `low`.
+
+        Returns:
+            How to control each joint.
         """
         weight = self._system.link_weight_torques(z)
         effort = self._effort / self._unit
-        middle = self._model.nominal_torques(
+        middle, roles = self._model.actuation(
             gradients, -effort - weight, effort - weight, self._squeeze
         )
         # The middle of an interval of no width may be beside it by rounding.
@@ -61,6 +77,19 @@ class TorqueProfile:
         self._middles.append(middle)
         within = np.fmax(low, -self._effort), np.fmin(high, self._effort)
         self._limits.append(((within[0][0], within[1][0]), (within[0][-1], within[1][-1])))
+        self._effort_joints = self._chosen(roles)
+        return {
+            name: EFFORT if joint in self._effort_joints else POSITION
+            for joint, name in enumerate(self._system.problem.hand.joint_names)
+        }
+
+    def _chosen(self, roles: Sequence[Roles]) -> tuple[int, ...]:
+        """The best roles, or those of the segment before if they are nearly as good."""
+        best = roles[0]
+        for choice in roles:
+            if choice.effort == self._effort_joints and choice.margin >= _KEPT * best.margin:
+                return choice.effort
+        return best.effort
 
     def joined(self) -> tuple[FloatArray, FloatArray]:
         """Join the segments at the frames that they share.

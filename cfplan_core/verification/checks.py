@@ -24,6 +24,9 @@ BARELY = 1e-6
 HAIR = 1e-4
 """Form-closure margin up to which a grasp may also be called one of force closure."""
 
+RANK = 1e-7
+"""Singular value below which motions that keep contacts count as dependent."""
+
 UNBOUNDED = 1e6
 """Torque, in weights times sizes of the object, above which a limit is as good as none."""
 
@@ -94,6 +97,9 @@ CHECKS = {
         'nominal torques balance the object: distance from equilibria / (weight × size)', 1e-5
     ),
     'nominal_effort': Rule('nominal torques / effort limit', 1.0 + 1e-9),
+    'control': Rule(
+        'held joints can be off a little without a contact lost, the others cannot move alone'
+    ),
     'effort': Rule('the joints are strong enough: effort needed / effort limit', 1.0 + 1e-9),
     'between_gap': Rule('gaps half-way between frames / (lever × turn²)', 0.25),
     'between_motion': Rule('distance from half-way to the contacts / step', 0.25),

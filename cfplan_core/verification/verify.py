@@ -13,6 +13,7 @@ from cfplan_core.verification.balance_checks import (
     Limits,
     check_barely_stable,
     check_class,
+    check_control,
     check_nominal,
     check_stable,
     check_torques,
@@ -77,6 +78,11 @@ def verify_plan(problem: Problem, result: PlanResult) -> VerificationReport:
         events = {frame: touching_pairs(mechanism, scenes[frame]) for frame in ends}
         for stretch in stretches:
             _check_steps(mechanism, stretch, scenes, events, record)
+            control = result.segments[stretch.number - 1].control
+            if control is not None:
+                frames = range(stretch.first, stretch.last + 1)
+                holds = [_hold(mechanism, stretch, frame, scenes[frame]) for frame in frames]
+                check_control(holds, control, record)
         for frame in range(len(scenes)):
             sharing = [s for s in stretches if s.first <= frame <= s.last]
             claimed = result.torque_lower[frame], result.torque_upper[frame]

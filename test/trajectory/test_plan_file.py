@@ -159,7 +159,12 @@ def test_planned_torque_and_control_are_part_of_the_format(
     document['frames'][0]['torque_nominal'] = [0.0, 0.1]
     document['segments'][0]['control'] = {'left': 'position', 'right': 'effort'}
     path.write_text(json.dumps(document), encoding='utf-8')
-    assert equal(read_plan(path), result)
+    control = {'left': 'position', 'right': 'effort'}
+    first = replace(result.segments[0], control=control)
+    kept = replace(result, segments=(first, *result.segments[1:]))
+    assert equal(read_plan(path), kept)
+    write_plan(kept, path)
+    assert equal(read_plan(path), kept)
 
 
 @pytest.mark.parametrize('status', [s for s in Status if s is not Status.SOLVED])

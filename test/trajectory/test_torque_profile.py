@@ -13,6 +13,8 @@ from cfplan_core.contact.detection import touching
 from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.errors import CfplanError
+from cfplan_core.mechanics.contact_model import Actuation
+from cfplan_core.mechanics.control_roles import Roles
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.options import TrajectoryOptions
 from cfplan_core.trajectory.torque_profile import TorqueProfile
@@ -86,8 +88,8 @@ def profile_of(*stretches: tuple[float, float, float]) -> tuple[np.ndarray, np.n
     class Given(FrictionlessModel):
         nominal = 0.0
 
-        def nominal_torques(self, gradients, lower, upper, squeeze):  # type: ignore[no-untyped-def]
-            return np.full((2, 2), self.nominal)
+        def actuation(self, gradients, lower, upper, squeeze):  # type: ignore[no-untyped-def]
+            return Actuation(np.full((2, 2), self.nominal), (Roles((), np.inf),))
 
     system = ContactSystem(pushed_block())
     model = Given(system.load)
@@ -126,7 +128,7 @@ def test_a_pushed_block_is_pressed_half_as_hard_as_it_can_bear() -> None:
     heights = np.sin(z[0, 3:]) * [LEFT, 0.045]
     pairs = np.array(touching(system, z[0], 1e-6))
     gradients = gap_gradients(system, system.place(z), pairs)
-    torque = model.nominal_torques(gradients, *(np.full((1, 2), x) for x in (-99.0, 99.0)), 50.0)
+    torque = model.actuation(gradients, np.full((1, 2), -99.0), np.full((1, 2), 99.0), 50.0)[0]
     force = 0.1 * 9.81 * HALF / abs(heights[0] - heights[1])
     expected = 0.5 * force * heights * [-1.0, 1.0]
     unit = system.force_unit * system.size

@@ -387,11 +387,51 @@ def test_shared_frame_may_not_mix_the_torque_limits_of_its_segments(sliding: Pla
     assert failed(report) == {'torque_limits_at_ends'}
 
 
+def controlled(plan: Plan, left: str, right: str) -> Plan:
+    """The same roles in all segments."""
+    problem, result = plan
+    control = {'left_joint': left, 'right_joint': right}
+    segments = tuple(replace(segment, control=control) for segment in result.segments)
+    return problem, replace(result, segments=segments)
+
+
 def with_nominal(plan: Plan) -> Plan:
     """The sliding box with the middles of its limits; where two segments meet, of the earlier."""
-    problem, result = plan
+    problem, result = controlled(plan, 'position', 'effort')
     nominal = 0.5 * (result.torque_lower + result.torque_upper)
     return problem, replace(result, torque_nominal=nominal)
+
+
+def test_one_finger_held_and_one_in_torque_control_is_certified(sliding: Plan) -> None:
+    assert verify_plan(*controlled(sliding, 'position', 'effort')).failures == ()
+
+
+@pytest.mark.parametrize(
+    ('left', 'right', 'message'),
+    [
+        ('position', 'position', 'the grasp jams; 1 more in effort control expected'),
+        ('effort', 'effort', '2 joints are in effort control, expected 1'),
+    ],
+)
+def test_control_that_does_not_keep_the_contacts_is_found(
+    sliding: Plan, left: str, right: str, message: str
+) -> None:
+    report = verify_plan(*controlled(sliding, left, right))
+    assert failed(report) == {'control'}
+    assert any(message in failure.message for failure in report.failures)
+
+
+def test_left_finger_that_lifts_off_cannot_be_in_torque_control(sliding: Plan) -> None:
+    problem, result = controlled(sliding, 'effort', 'position')
+    report = verify_plan(problem, result)
+    assert failed(report) == {'control'}
+    assert frames_failing(report, 'control') == {8}
+
+
+def test_control_of_an_unknown_joint_is_found(sliding: Plan) -> None:
+    problem, result = sliding
+    spoiled = with_segment(result, 0, control={'left_joint': 'effort', 'thumb': 'position'})
+    assert failed(verify_plan(problem, spoiled)) == {'control'}
 
 
 def test_nominal_torques_in_the_middle_are_certified(sliding: Plan) -> None:

@@ -1,0 +1,134 @@
+"""Time-optimal motion along a path, by reachability analysis (Pham & Pham, TOPP-RA, 2018).
+
+Of a coordinate q(s) the velocity is q' ṡ and the acceleration q' s̈ + q'' ṡ². Limits on both are
+linear in s̈ and ṡ², and toppra finds the largest ṡ that can be sped up to and stopped from.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfplan_core.geometry.polygon import FloatArray
+
+# Steps that a stretch is divided into at least.
+_FEWEST = 8
+_TINY = 1e-12
+
+
+def fastest_steps(path: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> FloatArray:
+    """Time the steps of a smooth path from rest to rest.
+
+    Args:
+        path: Shape (f, m): coordinates at the frames.
+        velocity: Shape (f - 1, m): limits on each step, inf for none.
+        acceleration: Shape (m,): limits, inf for none.
+
+    Returns:
+        Shape (f - 1,), s: the least times, as near as the path between frames is known; zero where
+        nothing moves. Where no motion keeps the limits at rest or the path is too crooked to
+        tell, those with which each step alone keeps its velocity limits.
+    """
+    changes = np.diff(path, axis=0)
+    lengths = np.linalg.norm(changes, axis=1)
+    alone = np.asarray((np.abs(changes) / velocity).max(axis=1, initial=0.0))
+    if (lengths <= _TINY).any():
+        return alone
+    parts = -(-_FEWEST // len(lengths))
+    grid, first, second = _derivatives(changes, lengths, parts)
+    speeds = _largest_speeds(first, velocity, parts)
+    used = np.isfinite(acceleration)
+    profile = _profile(grid, first[:, used], second[:, used], speeds, acceleration[used])
+    if profile is None:
+        return alone
+    mean = 0.5 * (profile[1:] + profile[:-1])
+    if not (mean > 0.0).all():
+        return alone
+    return np.asarray((np.diff(grid) / mean).reshape(-1, parts).sum(axis=1))
+
+
+def _derivatives(
+    changes: FloatArray, lengths: FloatArray, parts: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Path parameter, shape (g,), and first and second derivatives, (g, m), on a grid.
+
+    The parameter is the length of the path; every step is divided into equal parts. Derivatives
+    are those of parabolas through three frames, and linear in between.
+    """
+    secants = changes / lengths[:, None]
+    first = np.repeat(secants[:1], len(lengths) + 1, axis=0)
+    second = np.zeros_like(first)
+    if len(lengths) > 1:
+        before, after = lengths[:-1, None], lengths[1:, None]
+        second[1:-1] = 2.0 * (secants[1:] - secants[:-1]) / (before + after)
+        second[0], second[-1] = second[1], second[-2]
+        first[1:-1] = (after * secants[:-1] + before * secants[1:]) / (before + after)
+        first[0] = secants[0] - 0.5 * lengths[0] * second[0]
+        first[-1] = secants[-1] + 0.5 * lengths[-1] * second[-1]
+    frames = np.concatenate([[0.0], np.cumsum(lengths)])
+    if parts == 1:
+        return frames, first, second
+    index = np.arange(len(lengths) * parts + 1)
+    step = np.minimum(index // parts, len(lengths) - 1)
+    share = (index / parts - step)[:, None]
+    grid = frames[step] + share[:, 0] * lengths[step]
+    return (
+        grid,
+        (1.0 - share) * first[step] + share * first[step + 1],
+        (1.0 - share) * second[step] + share * second[step + 1],
+    )
+
+
+def _largest_speeds(first: FloatArray, velocity: FloatArray, parts: int) -> FloatArray:
+    """Largest ṡ that keeps velocity limits at each point of the grid: of the steps beside it."""
+    limits = np.repeat(velocity, parts, axis=0)
+    limits = np.minimum(
+        np.concatenate([limits[:1], limits]), np.concatenate([limits, limits[-1:]])
+    )
+    return np.asarray(1.0 / np.maximum((np.abs(first) / limits).max(axis=1), _TINY))
+
+
+def _profile(
+    grid: FloatArray,
+    first: FloatArray,
+    second: FloatArray,
+    speeds: FloatArray,
+    acceleration: FloatArray,
+) -> FloatArray | None:
+    """Run TOPP-RA: ṡ on the grid, shape (g,), or None."""
+    # They cost most of a second to import.
+    from toppra.algorithm import TOPPRA
+    from toppra.constraint import (
+        DiscretizationType,
+        JointAccelerationConstraint,
+        LinearConstraint,
+    )
+    from toppra.interpolator import AbstractGeometricPath
+
+    class Path(AbstractGeometricPath):  # type: ignore[misc]
+        """Derivatives on the grid, which is all that is asked for."""
+
+        dof = first.shape[1]
+        path_interval = grid[[0, -1]]
+        waypoints = (grid, first)
+
+        def __call__(self, positions: FloatArray, order: int = 0) -> FloatArray:
+            return (first, first, second)[order]
+
+    class Speed(LinearConstraint):  # type: ignore[misc]
+        """Bounds of ṡ²."""
+
+        dof = first.shape[1]
+        _format_string = ''
+
+        def compute_constraint_params(self, *_: object) -> tuple[FloatArray | None, ...]:
+            bounds = np.column_stack([np.zeros_like(speeds), speeds**2])
+            return (*[None] * 6, bounds)
+
+    limits = np.column_stack([-acceleration, acceleration])
+    constraints = [
+        Speed(),
+        JointAccelerationConstraint(limits, discretization_scheme=DiscretizationType.Collocation),
+    ]
+    problem = TOPPRA(constraints, Path(), gridpoints=grid, solver_wrapper='seidel')
+    _, profile, _ = problem.compute_parameterization(0.0, 0.0)
+    return None if profile is None or np.isnan(profile).any() else np.asarray(profile)
