@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cfplan_core.contact.system import ContactSystem
+from cfplan_core.contact.system import BoolArray, ContactSystem
 from cfplan_core.errors import CfplanError
 from cfplan_core.execution.feedforward import planned_torques
 from cfplan_core.execution.outcome import Outcome, Tolerance, assess
@@ -17,6 +17,7 @@ from cfplan_core.execution.scene import build_scene
 from cfplan_core.execution.simulation import Gains, Run, simulate
 from cfplan_core.model import Problem
 from cfplan_core.trajectory.plan_result import PlanResult
+from cfplan_core.trajectory.torque_profile import POSITION
 
 # Stiffness of a joint held in position, in weights times sizes of the object per radian: for
 # 0.1 kg and 6 cm about 20 N·m/rad.
@@ -36,6 +37,8 @@ class ExecutionOptions:
         seed: Of the errors that are drawn.
         gain: Stiffness of joints held in position, N·m/rad; None for one that fits the object's
             weight and size.
+        roles: True to give the joints that the plan controls in torque their torque alone; False
+            to hold all joints in position, with the plan's torques fed forward.
         time_step: Of the engine, s.
         sampling: Time between measurements, s.
     """
@@ -43,6 +46,7 @@ class ExecutionOptions:
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
     seed: int = 0
     gain: float | None = None
+    roles: bool = False
     time_step: float = 5e-4
     sampling: float = 5e-3
 
@@ -129,9 +133,20 @@ class Executor:
             self.system,
             result,
             planned_torques(self.system, result),
-            np.ones((len(result.segments), joints), dtype=bool),
+            self._stiff(),
             options.time_step,
             _REST,
+        )
+
+    def _stiff(self) -> BoolArray:
+        """Which joints are held in position in each segment, shape (segments, n)."""
+        segments, names = self.result.segments, self.result.joint_names
+        if not self.options.roles:
+            return np.ones((len(segments), len(names)), dtype=bool)
+        if any(segment.control is None for segment in segments):
+            raise CfplanError('roles: the plan does not say how its joints are to be controlled')
+        return np.array(
+            [[(s.control or {})[name] == POSITION for name in names] for s in segments]
         )
 
     def run(self, trial: int) -> Execution:

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicHermiteSpline
 from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.trajectory.plan_result import PlanResult
-from cfplan_core.trajectory.timing import joint_velocities
+from cfplan_core.trajectory.timing import joint_velocities, rest_frames
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +60,10 @@ def build_reference(
     clock = np.minimum(times, end)
     ends = result.times[[segment.last_frame for segment in result.segments]]
     segments = np.minimum(np.searchsorted(ends, clock, side='right'), len(ends) - 1)
-    joints, velocities = _cubics(result.times, result.joints, clock)
+    rests = rest_frames(result.joints, result.segments)
+    joints, velocities = _cubics(result.times, result.joints, rests, clock)
     velocities[times >= end] = 0.0
-    poses, _ = _cubics(result.times, result.object_poses, clock)
+    poses, _ = _cubics(result.times, result.object_poses, rests, clock)
     fed = np.empty(joints.shape)
     for k, segment in enumerate(result.segments):
         inside = segments == k
@@ -75,10 +76,10 @@ def build_reference(
 
 
 def _cubics(
-    times: FloatArray, values: FloatArray, at: FloatArray
+    times: FloatArray, values: FloatArray, rests: list[int], at: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Values and slopes of the cubics that a controller puts through a plan's frames."""
     if len(times) < 2:
         return np.repeat(values, len(at), axis=0), np.zeros((len(at), values.shape[1]))
-    cubics = CubicHermiteSpline(times, values, joint_velocities(times, values))
+    cubics = CubicHermiteSpline(times, values, joint_velocities(times, values, rests))
     return cubics(at), cubics(at, 1)

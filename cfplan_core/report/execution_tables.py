@@ -9,8 +9,11 @@ from rich.text import Text
 
 from cfplan_core.execution.execute import Execution
 from cfplan_core.execution.outcome import Outcome
+from cfplan_core.execution.trials import Trials
 from cfplan_core.model import Problem
 from cfplan_core.trajectory.plan_result import PlanResult
+
+_MOST_LOSSES = 5
 
 
 def execution_table(problem: Problem, result: PlanResult, execution: Execution) -> Group:
@@ -105,3 +108,37 @@ def _torque_table(problem: Problem, outcome: Outcome) -> RenderableType:
             f'{outcome.torque_excess[k]:.1%} of weight times size',
         )
     return table
+
+
+def trials_table(problem: Problem, result: PlanResult, trials: Trials) -> Group:
+    """Say how often a plan ended in its goal grasp, how far off it was, and what it lost first.
+
+    Args:
+        problem: What was planned.
+        result: Its plan.
+        trials: Of the plan.
+    """
+    success = trials.success
+    low, high = success.interval
+    table = _new_table('Object', 'Median', '90 % stay below', 'Worst')
+    for label, unit, values in (
+        ('position at the end (mm)', 1e3, lambda o: o.final_position_error),
+        ('angle at the end (rad)', 1.0, lambda o: o.final_angle_error),
+        ('position on the way (mm)', 1e3, lambda o: o.largest_position_deviation),
+        ('angle on the way (rad)', 1.0, lambda o: o.largest_angle_deviation),
+    ):
+        quantiles = [unit * trials.quantile(values, part) for part in (0.5, 0.9, 1.0)]
+        table.add_row(label, *(f'{value:.3f}' for value in quantiles))
+    losses = trials.first_losses().most_common(_MOST_LOSSES)
+    lines = [f'{times:5} × {name}, in segment {k + 1}' for (k, name), times in losses]
+    lost = [Text('Lost first where the object missed the goal', 'bold'), Text('\n'.join(lines))]
+    return Group(
+        Text(
+            f'{result.problem}: in the goal grasp {success.successes} of {success.trials} times, '
+            f'{success.successes / success.trials:.0%} ({low:.0%} to {high:.0%} with a confidence '
+            'of 95 %)',
+            'bold',
+        ),
+        table,
+        *(lost if lines else []),
+    )
