@@ -163,23 +163,27 @@ def _made(
     run: Run,
     near: BoolArray,
 ) -> tuple[ContactEvent, ...]:
-    vertex = system.pair_vertex[: system.contact_count]
-    body = system.body_of[system.pair_edge[: system.contact_count]]
+    everything = slice(0, system.contact_count)
+    vertex = system.pair_vertex[everything]
+    body = system.body_of[system.pair_edge[everything]]
     pressing = near & (run.forces[:, vertex, body] > _PRESSING * system.force_unit)
-    names = system.contact_names(range(system.contact_count))
-    made = {}
-    for k, segment in enumerate(result.segments):
+    placed = system.place(configurations(system, run.object_poses, run.joints))
+    points = placed.vertices[:, vertex]
+    made = []
+    for k in range(len(result.segments)):
         beside = result.segments[max(0, k - 1) : k + 2]
-        known = {name for other in (segment, *beside) for name in other.contacts}
-        # On a vertex the engine's contact belongs to either edge.
-        known_pairs = {(vertex[p], body[p]) for p, name in enumerate(names) if name in known}
-        for p, name in enumerate(names):
-            if name in known or (vertex[p], body[p]) in known_pairs:
-                continue
-            at = np.flatnonzero((segments == k) & pressing[:, p])
-            if len(at):
-                made[k, name] = ContactEvent(float(run.times[at[0]]), k, name)
-    return tuple(sorted(made.values(), key=lambda event: event.time))
+        names = dict.fromkeys(name for segment in beside for name in segment.contacts)
+        known = np.array([system.pair(parse_contact(name)) for name in names], dtype=np.intp)
+        inside = np.flatnonzero((segments == k) & pressing.any(axis=1))
+        for p in np.flatnonzero(pressing[inside].any(axis=0)):
+            # Where a vertex lies on a vertex, the same contact has several names.
+            same = known[system.pair_body[known] == system.pair_body[p]]
+            apart = np.abs(points[np.ix_(inside, same)] - points[inside, p, None])
+            elsewhere = pressing[inside, p] & (apart > _OPEN).all(axis=1)
+            if elsewhere.any():
+                time = float(run.times[inside[elsewhere.argmax()]])
+                made.append(ContactEvent(time, k, system.contact_names([int(p)])[0]))
+    return tuple(sorted(made, key=lambda event: event.time))
 
 
 def _torque_excess(

@@ -32,7 +32,7 @@ _HALF_THICKNESS = 0.25
 _DRIVE_INERTIA = 1.0
 _LINK_MASS = 1e-3
 # Contacts push back with a time constant of so many steps, and are damped critically.
-_STIFFNESS_STEPS = 2.5
+_STIFFNESS_STEPS = 10.0
 _IMPEDANCE = (0.99, 0.999, 1e-4, 0.5, 2.0)
 
 
