@@ -55,8 +55,10 @@ setup(
         'shapely>=2.0',
     ],
     extras_require={
+        'mujoco': ['mujoco>=3.3'],
         'test': [
             'hypothesis>=6.100',
+            'mujoco>=3.3',
             'psutil>=5.9',
             'pytest>=7.4',
             'pytest-benchmark>=4.0',

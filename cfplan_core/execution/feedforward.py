@@ -1,4 +1,4 @@
-"""Torques that a plan's drives are fed, where the plan itself says none."""
+"""Torques that a plan's drives are fed."""
 
 from __future__ import annotations
 
@@ -51,15 +51,12 @@ def planned_torques(system: ContactSystem, result: PlanResult) -> tuple[FloatArr
     """Nominal torques of the plan; of one without, as `least_torques`.
 
     Returns:
-        For each segment shape (f, n), N·m. At its first frame those with which it is entered,
-        where the plan still knows them; a plan file does not.
+        For each segment shape (f, n), N·m. A frame shared by two segments has one torque, as in
+        a plan file, so that a plan from a file runs as it would have before it was written.
     """
     if not len(result.torque_nominal):
         return least_torques(system, result)
-    torques = []
-    for k, segment in enumerate(result.segments):
-        own = result.torque_nominal[segment.first_frame : segment.last_frame + 1].copy()
-        if len(result.entry_nominal):
-            own[0] = result.entry_nominal[k]
-        torques.append(own)
-    return tuple(torques)
+    return tuple(
+        result.torque_nominal[segment.first_frame : segment.last_frame + 1]
+        for segment in result.segments
+    )

@@ -108,7 +108,6 @@ def test_joint_in_torque_is_given_its_torque_alone(planned: PlanResult, execute:
 
 def test_torque_fed_forward_makes_up_for_softness(problem: Problem, planned: PlanResult) -> None:
     without = replace(planned, torque_nominal=np.zeros_like(planned.torque_nominal))
-    without = replace(without, entry_nominal=np.empty((0, 0)))
     options = ExecutionOptions(gain=5.0)
     fed, unfed = (execute_plan(problem, plan, options).outcome for plan in (planned, without))
     assert fed.largest_position_deviation < 0.5 * unfed.largest_position_deviation
