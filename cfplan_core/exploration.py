@@ -100,7 +100,8 @@ def _reachable(roadmap: Roadmap, start: Piece) -> nx.Graph:
     queue = [start]
     graph.add_node(start.index, **_attributes(roadmap, start))
     for piece in queue:
-        for _, other in [*roadmap.neighbours(piece), *roadmap.regions.beside(piece)]:
+        beside = [*roadmap.regions.beside(piece), *roadmap.settling.beside(piece)]
+        for _, other in [*roadmap.neighbours(piece), *beside]:
             if other.index not in graph:
                 graph.add_node(other.index, **_attributes(roadmap, other))
                 queue.append(other)

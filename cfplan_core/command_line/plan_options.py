@@ -106,6 +106,12 @@ def wanted_plan(command: Command) -> Command:
             metavar="'X,Y X,Y X,Y...'",
             help='Keep the object inside this convex polygon: corners in m, counter-clockwise.',
         ),
+        click.option(
+            '--second-order/--no-second-order',
+            default=True,
+            show_default=True,
+            help='Whether two contacts may hold the object at a strict minimum of its energy.',
+        ),
     ]
     for option in reversed(options):
         command = option(command)

@@ -20,7 +20,11 @@ from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.events import OPEN_EVENTS, EventKind
-from cfplan_core.planning.manifold import independent_rows, tangent_basis
+from cfplan_core.planning.manifold import (
+    formation_equations,
+    independent_rows,
+    tangent_basis,
+)
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, STEP, Trace, classify
@@ -196,12 +200,12 @@ class Regions:
         """Make the region that points from z lead into; the last of them is its anchor."""
         roadmap = self._roadmap
         anchor = inward[-1]
-        gradients = roadmap.tracer.gradients(anchor[None], formation.array)[0]
+        rows, _ = formation_equations(roadmap.system, formation.array, anchor)
         region = Region(
             len(roadmap.pieces),
             formation,
             classify(roadmap.tracer.margins(formation, anchor[None])),
-            roadmap.system.dof - len(independent_rows(gradients)),
+            roadmap.system.dof - len(rows),
             anchor[None],
             (),
             [(z, inward[::-1])],
@@ -284,14 +288,14 @@ class Regions:
 
         Each comes with the columns of z, joints, that are held still.
         """
-        gradients = self._roadmap.tracer.gradients(region.points, region.formation.array)[0]
-        rows = gradients[list(independent_rows(gradients))]
+        system = self._roadmap.system
+        _, rows = formation_equations(system, region.formation.array, region.anchor)
         basis = tangent_basis(rows)
         for direction in _directions(len(basis)):
             yield direction @ basis, ()
-        columns = range(3, self._roadmap.system.dof)
+        columns = range(3, system.dof)
         for held in islice(combinations(columns, len(basis) - 1), _RAYS):
-            still = np.concatenate([rows, np.eye(self._roadmap.system.dof)[list(held)]])
+            still = np.concatenate([rows, np.eye(system.dof)[list(held)]])
             if len(independent_rows(still)) == len(still):
                 (tangent,) = tangent_basis(still)
                 yield tangent, held

@@ -29,7 +29,7 @@ class Table:
 
     Attributes:
         formation: The contacts.
-        rows: Three of them that are independent for fixed joints, shape (3,).
+        rows: Three of their equations that are independent for fixed joints, shape (3,).
         slivers: Sheets between the nodes.
         vertices: For each node the sheets over it, with the index of the vertex.
     """

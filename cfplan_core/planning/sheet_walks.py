@@ -54,7 +54,7 @@ def walk(
     Args:
         tracer: Knows system and model.
         formation: The contacts.
-        rows: Three of them that are independent for fixed joints.
+        rows: Three of their equations that are independent for fixed joints.
         starts: Shape (m, 3 + n), stable.
         joints: Shape (m, n).
     """

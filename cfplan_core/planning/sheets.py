@@ -18,9 +18,10 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.options import RESOLUTION
+from cfplan_core.planning.equations import equation_gradients, formation_rows
 from cfplan_core.planning.events import EventKind
 from cfplan_core.planning.joint_grid import JointGrid, Place
-from cfplan_core.planning.manifold import independent_rows, project
+from cfplan_core.planning.manifold import formation_equations, independent_rows, project
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.regions import Regions, _heading
 from cfplan_core.planning.sheet_filling import Table, fill
@@ -109,15 +110,15 @@ class Sheets(Regions):
         """Points of a curve and three more between any two of them."""
         if piece.dimension != 1:
             return piece.points
-        tracer, pairs = self._roadmap.tracer, piece.formation.array
+        system = self._roadmap.system
         before, after = piece.points[:-1], piece.points[1:]
-        gradients = tracer.gradients(before, pairs)
-        rows = list(independent_rows(gradients[len(before) // 2]))
-        bases = np.linalg.svd(gradients[:, rows])[2][:, len(rows) :]
+        middle = before[len(before) // 2]
+        rows, _ = formation_equations(system, piece.formation.array, middle)
+        bases = np.linalg.svd(equation_gradients(system, before, rows))[2][:, len(rows) :]
         parts = [before]
         for fraction in (0.25, 0.5, 0.75):
             guesses = before + fraction * (after - before)
-            found = project(tracer.system, pairs[rows], before, bases, guesses)
+            found = project(system, rows, before, bases, guesses)
             parts.append(np.where(found.converged[:, None], found.points, before))
         between = np.stack(parts, axis=1).reshape(-1, piece.points.shape[1])
         return np.concatenate([between, piece.points[-1:]])
@@ -227,9 +228,10 @@ class Sheets(Regions):
 
     def _table(self, formation: Formation, z: FloatArray) -> Table:
         if formation not in self._tables:
-            gradients = self._roadmap.tracer.gradients(z[None], formation.array)[0]
-            rows = formation.array[list(independent_rows(gradients[:, :3]))]
-            self._tables[formation] = Table(formation, rows)
+            rows = formation_rows(formation.array)
+            gradients = equation_gradients(self._roadmap.system, z[None], rows)[0]
+            chosen = list(independent_rows(gradients[:, :3]))
+            self._tables[formation] = Table(formation, rows[chosen])
         return self._tables[formation]
 
     def _shoot(self, region: Region) -> Iterator[tuple[FloatArray, Piece]]:
