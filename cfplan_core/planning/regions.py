@@ -52,6 +52,7 @@ class Regions:
         self._known: dict[tuple[Formation, Stability], list[Region]] = {}
         self._beyond: dict[int, list[tuple[FloatArray, Piece]]] = {}
         self._beside: dict[int, list[tuple[FloatArray, Piece]]] = {}
+        self._losses: dict[int, list[FloatArray]] = {}
 
     def coverage(self) -> str:
         """Say how completely formations were explored."""
@@ -83,6 +84,10 @@ class Regions:
             assert isinstance(piece, Region)
             self._beyond[piece.index] = list(self._shoot(piece))
         return self._beyond[piece.index]
+
+    def losses(self, region: Region) -> Iterator[FloatArray]:
+        """Ways from a region's anchor to where stability ends, each (s, 3 + n); after `beyond`."""
+        yield from self._losses.get(region.index, ())
 
     def drop(self, region: Region, z: FloatArray) -> None:
         """Forget that a region is entered or left at a configuration, shape (3 + n,)."""
@@ -140,7 +145,7 @@ class Regions:
                 heading = self._opening(rest, pair, z)
                 if heading is None:
                     continue
-                region = self._enter(z, Departure(rest, heading, frozenset({pair})))
+                region = self.enter(z, Departure(rest, heading, frozenset({pair})))
                 if region is not None:
                     yield z, region
 
@@ -164,7 +169,7 @@ class Regions:
         steepness = float(np.linalg.norm(slope))
         return None if steepness < STABILITY_MARGIN else slope @ basis / steepness
 
-    def _enter(self, z: FloatArray, way: Departure) -> Region | None:
+    def enter(self, z: FloatArray, way: Departure) -> Region | None:
         """Follow a heading into a region and return it; None if it ends at once."""
         trace = self._ray(z, way, _DEPTH)
         self._roadmap.attempts += 1
@@ -274,12 +279,14 @@ class Regions:
                 ways = self._ways(region, end, _heading(points))
             else:
                 roadmap.failures[trace.why] += 1
+                if trace.kind is EventKind.UNSTABLE:
+                    self._losses.setdefault(region.index, []).append(points)
                 continue
             region.links.append((end, points))
             if not others and self._joins(region, end):
                 yield end, roadmap.root(end)
             for way in ways:
-                entered = self._enter(end, way)
+                entered = self.enter(end, way)
                 if entered is not None and entered is not region:
                     yield end, entered
 

@@ -24,7 +24,7 @@ from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.mechanics.second_order import imbalance, pair_forces
 from cfplan_core.planning.equations import EQUILIBRIUM, equations
 from cfplan_core.planning.manifold import formation_equations, tangent_basis
-from cfplan_core.planning.pieces import Piece
+from cfplan_core.planning.pieces import Piece, Region
 from cfplan_core.planning.tracing import STABILITY_MARGIN
 from cfplan_core.planning.transitions import Departure, Surroundings
 
@@ -38,6 +38,8 @@ _BEHIND = 1e-3
 _BALANCED = 1e-8
 # Rates of gaps and forces along a motion below this are none.
 _RATE = 1e-7
+# Distance of places on one border, in radians and object sizes.
+_APART = 0.1
 _ITERATIONS = 12
 
 
@@ -48,22 +50,25 @@ class Settling:
         """Start empty."""
         self._roadmap = roadmap
         self._beside: dict[int, list[tuple[FloatArray, Piece]]] = {}
+        self._back: dict[int, list[tuple[FloatArray, Piece]]] = {}
 
     def beside(self, piece: Piece) -> list[tuple[FloatArray, Piece]]:
         """Pieces that a piece meets where contact forces vanish, with where."""
         if not self._roadmap.model.second_order:
             return []
         if piece.index not in self._beside:
-            self._beside[piece.index] = [
-                (z, found)
-                for z in self._places(piece)
-                for found in self._behind(z)
-                if found is not piece
-            ]
-        return self._beside[piece.index]
+            self._beside[piece.index] = []
+            for z in self._places(piece):
+                for found in self._behind(z):
+                    if found is not piece:
+                        self._beside[piece.index].append((z, found))
+                        self._back.setdefault(found.index, []).append((z, piece))
+        return [*self._beside[piece.index], *self._back.get(piece.index, ())]
 
     def _places(self, piece: Piece) -> Iterator[FloatArray]:
         """Configurations at the end of a piece where two contacts may balance the object."""
+        if isinstance(piece, Region):
+            yield from self._on_border(piece)
         if piece.dimension != 1:
             return
         for end, z in zip(piece.ends, (piece.points[0], piece.points[-1]), strict=True):
@@ -73,6 +78,26 @@ class Settling:
                 located = self.locate(piece.formation, z)
                 if located is not None:
                     yield located
+
+    def _on_border(self, region: Region) -> Iterator[FloatArray]:
+        """Configurations, linked to a region, on its border, some way apart."""
+        regions = self._roadmap.regions
+        # Looking at what is beyond links the borders.
+        regions.beyond(region)
+        if region.stability is Stability.SECOND_ORDER:
+            places = [z for z, _ in region.links]
+        else:
+            places = []
+            for points in regions.losses(region):
+                located = self.locate(region.formation, points[-1])
+                if located is not None:
+                    region.links.append((located, np.concatenate([points, located[None]])))
+                    places.append(located)
+        kept: list[FloatArray] = []
+        for z in places:
+            if all(np.abs(z - other).max() > _APART for other in kept):
+                kept.append(z)
+                yield z
 
     def locate(self, formation: Formation, z: FloatArray) -> FloatArray | None:
         """Find where, near the end of its stability, a formation is balanced by two contacts.
@@ -183,7 +208,8 @@ class Settling:
             roadmap.attempts += 1
             rows, _ = formation_equations(roadmap.system, way.formation.array, z)
             if roadmap.system.dof - len(rows) > 1:
-                continue
-            piece = roadmap.curve_along(z, way)
+                piece: Piece | None = roadmap.regions.enter(z, way)
+            else:
+                piece = roadmap.curve_along(z, way)
             if piece is not None:
                 yield piece

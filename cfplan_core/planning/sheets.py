@@ -24,10 +24,11 @@ from cfplan_core.planning.joint_grid import JointGrid, Place
 from cfplan_core.planning.manifold import formation_equations, independent_rows, project
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.regions import Regions, _heading
+from cfplan_core.planning.settling_steps import settling_steps
 from cfplan_core.planning.sheet_filling import Table, fill
 from cfplan_core.planning.sheet_graph import Border, Sheet
 from cfplan_core.planning.sheet_steps import take_steps
-from cfplan_core.planning.sheet_walks import walk
+from cfplan_core.planning.sheet_walks import towards, walk
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STEP, classify
 from cfplan_core.planning.transitions import Departure
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 
 # Number of grids, each half as coarse as the one before.
 _LEVELS = 4
+# Distance of places where contact forces are let vanish on a border, by the grid's spacing.
+_BORDER = 3.0
 
 
 class Sheets(Regions):
@@ -105,6 +108,24 @@ class Sheets(Regions):
             if len(split_by_class(tracer, region.formation, trace.points)) == 1:
                 region.links.append((trace.end, trace.points))
                 yield trace.end
+
+    def losses(self, region: Region) -> Iterator[FloatArray]:
+        """Ways from a sheet's vertices to where two contacts come to hold the object alone.
+
+        Not all of them: borders are sampled.
+        """
+        assert isinstance(region, Sheet)
+        if region.places == [None]:
+            yield from super().losses(region)
+        if not region.losses:
+            return
+        tracer, rows = self._roadmap.tracer, self._table(region.formation, region.anchor).rows
+        vertices = np.array([region.vertices[vertex] for vertex, _ in region.losses])
+        joints = np.array([angles for _, angles in region.losses])
+        for k in settling_steps(tracer, rows, vertices, joints, _BORDER * self.grid.spacing):
+            trace = towards(tracer, region.formation, vertices[k], joints[k])
+            if trace.kind is EventKind.UNSTABLE and len(trace.points) > 1:
+                yield trace.points
 
     def _samples(self, piece: Piece) -> FloatArray:
         """Points of a curve and three more between any two of them."""
@@ -250,6 +271,6 @@ class Sheets(Regions):
                 heading = _heading(border.points)
                 onwards = [Departure(region.formation, heading, frozenset())]
                 for way in onwards if border.changes_class else self._ways(region, z, heading):
-                    entered = self._enter(z, way)
+                    entered = self.enter(z, way)
                     if entered is not None and entered is not region:
                         yield z, entered
