@@ -101,9 +101,17 @@ def second_order_margin(wrenches: FloatArray, rates: FloatArray, load: FloatArra
         and continuous along the equilibria; −1 off them.
     """
     forces, rest = pair_forces(wrenches, load)
+    balanced = rest <= _IMBALANCE * (1.0 + np.abs(forces).max(axis=1))
+    margin = unbalanced_margin(wrenches, rates, load)
+    return np.where(balanced & load.any(), margin, -1.0)
+
+
+def unbalanced_margin(wrenches: FloatArray, rates: FloatArray, load: FloatArray) -> FloatArray:
+    """As `second_order_margin`, but also where the contacts do not quite balance the load.
+
+    There the forces are those that come nearest to it.
+    """
+    forces, _ = pair_forces(wrenches, load)
     spread = np.linalg.norm(np.cross(wrenches[:, 0], wrenches[:, 1]), axis=1)
     margin = np.minimum(curvature(wrenches, rates, load), forces.min(axis=1))
-    balanced = rest <= _IMBALANCE * (1.0 + np.abs(forces).max(axis=1))
-    if not load.any():
-        balanced = np.zeros(len(wrenches), dtype=bool)
-    return np.asarray(np.where(balanced, np.minimum(margin, spread), -1.0))
+    return np.asarray(np.minimum(margin, spread))

@@ -176,6 +176,16 @@ def examine_grasp(
                 'vertices on the inside of edges: a vertex cannot be held on a vertex',
             )
         )
+    elif is_second_order(pairs) and not model.second_order and not findings:
+        findings.append(
+            Finding(
+                file,
+                field,
+                f'only the contacts {" and ".join(names)}, and stability of second order does not '
+                'count',
+                'at least three contacts',
+            )
+        )
     elif stability is Stability.UNSTABLE and not findings:
         margin = float(margins.stable[0])
         findings.append(
