@@ -4,6 +4,10 @@ The margin is the smallest of five ratios; 1 is comfortable, 0 is the border of 
 
 - force: 1 / F, where F is the needed force in weights of the object;
 - hold: the stability margin, the distance of W's columns and f from no longer spanning R³, / 0.2;
+  for two contacts that of second order, the smallest of the energy's curvature, the two forces
+  and the sine between the wrenches. Where a stretch begins or ends as other contacts stop pressing
+  and the object settles onto two of them, these two count if that is more, less the load that
+  they leave to the others;
 - clearance: the smallest distance between features of bodies that do not touch, in object sizes,
   / 0.1. Features that touch where the stretch begins do not count until they are as far apart as
   they get before they come nearer again, nor do, likewise backwards, those at its end: the plan
@@ -18,18 +22,25 @@ The margin is the smallest of five ratios; 1 is comfortable, 0 is the border of 
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
+from cfplan_core.contact.curvature import wrench_rates
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.gaps import gap_gradients, gaps
 from cfplan_core.contact.system import ComplexArray, ContactSystem, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel
+from cfplan_core.mechanics.second_order import pair_forces, unbalanced_margin
+from cfplan_core.planning.equations import is_second_order
+from cfplan_core.planning.tracing import stability_margins
 from cfplan_core.planning.transitions import TOUCH
 
 _COMFORTABLE_HOLD = 0.2
+# Load, in weights, that two contacts leave to others which only just touch.
+_SETTLED = 1e-6
 _COMFORTABLE_CLEARANCE = 0.1
 _COMFORTABLE_TORQUE = 0.2
 _COMFORTABLE_LIMIT = 0.1
@@ -76,12 +87,32 @@ class Robustness:
         joints = z[:, 3:]
         return Ratios(
             force=1.0 / np.maximum(needed, 1e-9),
-            hold=np.maximum(self._model.margins(gradients).stable, 0.0) / _COMFORTABLE_HOLD,
+            hold=np.maximum(self._hold(formation, z, placed, gradients), 0.0) / _COMFORTABLE_HOLD,
             clearance=self._clearance(formation, placed) / _COMFORTABLE_CLEARANCE,
             torque=self._torque(gradients, z) / _COMFORTABLE_TORQUE,
             limits=np.minimum(joints - system.lower, system.upper - joints).min(axis=1)
             / _COMFORTABLE_LIMIT,
         )
+
+    def _hold(
+        self, formation: Formation, z: FloatArray, placed: Placement, gradients: FloatArray
+    ) -> FloatArray:
+        """Stability margin, of two contacts where the others let go at an end of the stretch."""
+        system, model, pairs = self._system, self._model, formation.array
+        hold = stability_margins(system, model, z, gradients, pairs).stable
+        if not model.second_order or is_second_order(pairs):
+            return hold
+        for chosen in combinations(range(len(pairs)), 2):
+            two = list(chosen)
+            _, ends = pair_forces(gradients[[0, -1]][:, two, :3], system.load)
+            if not (ends < _SETTLED).any():
+                continue
+            rates = wrench_rates(system, placed, pairs[two])
+            wrenches = gradients[:, two, :3]
+            _, rest = pair_forces(wrenches, system.load)
+            settled = unbalanced_margin(wrenches, rates, system.load) - rest
+            hold = np.maximum(hold, settled)
+        return hold
 
     def _clearance(self, formation: Formation, placed: Placement) -> FloatArray:
         """Smallest distance of a vertex from an edge that it neither touches nor is to touch.
