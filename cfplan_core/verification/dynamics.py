@@ -5,8 +5,8 @@ Over three frames at t0 < t1 < t2 a coordinate x has the mean acceleration
     2 ((x2 - x1) / (t2 - t1) - (x1 - x0) / (t1 - t0)) / (t2 - t0),
 
 which every smooth motion through them has somewhere in between. Of one that starts or ends at rest
-the same holds for 2 (x1 - x0) / (t1 - t0)² over its first or last step. What they exceed, no way to
-join the frames can keep.
+the same holds for 2 (x1 - x0) / (t1 - t0)² over its first or last step. What these exceed, no way
+to join the frames can keep.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def test_motion_in_which_inertia_matters_is_found(sliding: Plan) -> None:
 
 def test_quick_motion_passes_where_inertia_is_allowed_to_matter(sliding: Plan) -> None:
     problem, result = sliding
-    hasty = replace(result, times=0.5 * result.times)
+    hasty = replace(result, times=0.3 * result.times)
     checks = [
         {failure.check for failure in verify_plan(problem, hasty, inertia=share).failures}
         for share in (0.05, 5.0)
