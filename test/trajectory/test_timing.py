@@ -10,7 +10,6 @@ from scipy.interpolate import CubicHermiteSpline
 from cfplan_core.trajectory.plan_result import Segment
 from cfplan_core.trajectory.timing import (
     NANOSECONDS,
-    contact_events,
     fastest,
     frame_times,
     joint_velocities,
@@ -162,15 +161,6 @@ def test_frames_that_do_not_move_still_have_increasing_times() -> None:
 def test_a_plan_of_a_million_years_still_has_increasing_times() -> None:
     times = frame_times(np.array([[0.0], [1.0], [2.0]]), 1, np.array([1e-14]), np.array([1.0]))
     assert (np.diff(times) > 1e14).all()
-
-
-def test_contact_events_are_where_contacts_change() -> None:
-    segments = [
-        Segment(('a', 'b'), 'form_closure', 0, 2),
-        Segment(('b', 'a'), 'force_closure', 2, 5),
-        Segment(('a', 'c'), 'force_closure', 5, 6),
-    ]
-    assert contact_events(segments) == [5]
 
 
 def test_a_plan_rests_at_contact_events_and_at_corners() -> None:
