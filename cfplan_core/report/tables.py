@@ -12,7 +12,8 @@ from rich.text import Text
 
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Problem
-from cfplan_core.trajectory.plan_result import PlanResult
+from cfplan_core.trajectory.plan_result import PlanResult, Segment
+from cfplan_core.trajectory.segment_ends import SegmentEnd, segment_ends
 
 MOST_FAILURES = 10
 
@@ -78,17 +79,19 @@ def _titled(title: str, table: Table) -> Group:
 def _segment_table(result: PlanResult) -> Table:
     table = _new_table()
     table.add_column('No.', justify='right')
-    table.add_column('Contacts', overflow='fold')
+    table.add_column('Contacts,\n- broken and + made\nat the end', overflow='fold')
     planned = any(segment.control is not None for segment in result.segments)
     heading = 'Stability,\nneeded force' + (',\nby torque' if planned else '')
     table.add_column(heading, overflow='fold')
     table.add_column('Frames', justify='right')
     table.add_column('Time (s)', justify='right')
-    for k, segment in enumerate(result.segments):
+    for k, (segment, ending) in enumerate(
+        zip(result.segments, segment_ends(result.segments), strict=True)
+    ):
         start, end = result.times[segment.first_frame], result.times[segment.last_frame]
         table.add_row(
             str(k + 1),
-            Text('\n'.join(segment.contacts)),
+            Text('\n'.join(_contacts(segment, ending))),
             segment.stability.replace('_', ' ')
             + _needed(segment.needed_force)
             + _torque_controlled(segment.control),
@@ -120,6 +123,12 @@ def _choice_table(result: PlanResult) -> Table:
 
 def _needed(force: float | None) -> str:
     return '' if force is None else f'\n{force:.2f} weights'
+
+
+def _contacts(segment: Segment, end: SegmentEnd) -> list[str]:
+    """Contacts of a segment, marked if they break at its end, and those that are made there."""
+    marked = [f'{name} -' if name in end.broken else name for name in segment.contacts]
+    return marked + [f'{name} +' for name in end.made]
 
 
 def _torque_controlled(control: Mapping[str, str] | None) -> str:

@@ -20,7 +20,8 @@ from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
 from cfplan_core.trajectory.inertia import moving_masses
 from cfplan_core.trajectory.plan_result import Segment
-from cfplan_core.trajectory.timing import contact_events, frame_times, rest_frames
+from cfplan_core.trajectory.segment_ends import contact_events
+from cfplan_core.trajectory.timing import frame_times, rest_frames
 from cfplan_core.trajectory.torque_profile import TorqueProfile
 
 # Largest change between frames of a joint or of the object's angle, in rad, and of its position,

@@ -15,6 +15,7 @@ from cfplan_core.errors import Finding, InvalidPlanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.trajectory.plan_format import FORMAT, refuse_malformed
 from cfplan_core.trajectory.plan_result import PlanResult, Segment, Statistics, Status
+from cfplan_core.trajectory.segment_ends import SegmentEnd, segment_ends
 
 Document = dict[str, Any]
 
@@ -158,7 +159,10 @@ def _document(result: PlanResult, name: str) -> Document:
             }
             for k in range(count)
         ],
-        'segments': [_segment(segment) for segment in result.segments],
+        'segments': [
+            _segment(segment, end)
+            for segment, end in zip(result.segments, segment_ends(result.segments), strict=True)
+        ],
         'statistics': {
             'planning_time': float(statistics.planning_time),
             'initial_tree_nodes': int(statistics.initial_tree_nodes),
@@ -170,7 +174,7 @@ def _document(result: PlanResult, name: str) -> Document:
     }
 
 
-def _segment(segment: Segment) -> Document:
+def _segment(segment: Segment, end: SegmentEnd) -> Document:
     document: Document = {
         'contacts': list(segment.contacts),
         'stability': segment.stability,
@@ -181,6 +185,11 @@ def _segment(segment: Segment) -> Document:
         document['needed_force'] = float(segment.needed_force)
     if segment.control is not None:
         document['control'] = dict(segment.control)
+        document['end'] = {
+            'event': end.ending.value,
+            'made': list(end.made),
+            'broken': list(end.broken),
+        }
     return document
 
 

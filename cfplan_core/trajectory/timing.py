@@ -16,6 +16,7 @@ import numpy as np
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.trajectory.parameterization import fastest_steps
 from cfplan_core.trajectory.plan_result import Segment
+from cfplan_core.trajectory.segment_ends import contact_events
 
 NANOSECONDS = 1_000_000_000
 """In a second. Times are whole nanoseconds, as messages and most files count them."""
@@ -61,15 +62,6 @@ def frame_times(
         if b > a
     ]
     return _times(np.concatenate([np.empty(0), *steps]))
-
-
-def contact_events(segments: Sequence[Segment]) -> list[int]:
-    """Frames at which a plan makes or breaks contacts, in order."""
-    return [
-        after.first_frame
-        for before, after in pairwise(segments)
-        if set(before.contacts) != set(after.contacts)
-    ]
 
 
 def rest_frames(joints: FloatArray, segments: Sequence[Segment]) -> list[int]:

@@ -71,6 +71,10 @@ CHECKS = {
     'goal_contacts': Rule('the contacts that the goal names touch', TOUCH, 'm'),
     'joint_limits': Rule('joints stay within their limits: excess', 1e-9, 'rad'),
     'joint_velocity': Rule('joint speeds / velocity limit', 1.0 + 1e-9),
+    'joint_acceleration': Rule('joint accelerations / acceleration limit', 1.0 + 1e-6),
+    'inertia': Rule(
+        'inertial forces and moments / their share of weight, weight × size', 1.0 + 1e-6
+    ),
     'joint_step': Rule('joint motion between frames', 0.05 + 1e-9, 'rad'),
     'object_step': Rule('object motion between frames / object size', 0.05 + 1e-9),
     'object_turn': Rule('object rotation between frames', 0.05 + 1e-9, 'rad'),

@@ -25,6 +25,11 @@ from cfplan_core.verification.contact_checks import (
     check_named_contacts,
     check_overlaps,
 )
+from cfplan_core.verification.dynamics import (
+    QUASI_STATIC,
+    check_acceleration,
+    check_inertia,
+)
 from cfplan_core.verification.halfway import halfway
 from cfplan_core.verification.mechanism import Mechanism, Scene, mechanism_of
 from cfplan_core.verification.overlap import overlap_depth
@@ -38,7 +43,9 @@ Events = Mapping[int, Mapping[str, tuple[Pair, Touch]]]
 """What touches, by contact name, at each frame at which a segment begins or ends."""
 
 
-def verify_plan(problem: Problem, result: PlanResult) -> VerificationReport:
+def verify_plan(
+    problem: Problem, result: PlanResult, inertia: float = QUASI_STATIC
+) -> VerificationReport:
     """Certify a plan, or say what is wrong with it.
 
     Nothing of the planner's geometry and mechanics is used: positions come from kinematics of
@@ -52,6 +59,7 @@ def verify_plan(problem: Problem, result: PlanResult) -> VerificationReport:
     Args:
         problem: What the plan is for; frictionless.
         result: The plan.
+        inertia: Share of the weight up to which inertial forces do not matter.
 
     Returns:
         The verdict, with every failure. A plan whose form is wrong is not checked further.
@@ -72,6 +80,8 @@ def verify_plan(problem: Problem, result: PlanResult) -> VerificationReport:
         check_goal(mechanism, result, scenes[-1], record)
         check_limits(mechanism, result, record)
         check_steps(mechanism, result, scenes, record)
+        check_acceleration(mechanism, result, record)
+        check_inertia(mechanism, result, scenes, inertia, record)
         for frame, scene in enumerate(scenes):
             check_overlaps(mechanism, frame, scene, record)
         ends = {frame for stretch in stretches for frame in (stretch.first, stretch.last)}

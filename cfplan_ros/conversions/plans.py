@@ -22,6 +22,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from cfplan_core.errors import Finding, InvalidPlanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.trajectory.plan_result import PlanResult, Segment, Statistics, Status
+from cfplan_core.trajectory.segment_ends import segment_ends
 from cfplan_core.trajectory.timing import joint_velocities, rest_frames
 from cfplan_core.trajectory.torque_profile import EFFORT, POSITION
 from cfplan_ros.conversions.contacts import contact_names, formation_message
@@ -133,8 +134,10 @@ def plan_message(result: PlanResult, frame_id: str, stamp: Time) -> Manipulation
             last_point=segment.last_frame,
             needed_force=math.nan if segment.needed_force is None else segment.needed_force,
             control=_roles(segment.control, result.joint_names),
+            made=formation_message(end.made),
+            broken=formation_message(end.broken),
         )
-        for segment in result.segments
+        for segment, end in zip(result.segments, segment_ends(result.segments), strict=True)
     ]
     return message
 

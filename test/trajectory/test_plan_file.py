@@ -165,6 +165,26 @@ def test_planned_torque_and_control_are_part_of_the_format(
     assert equal(read_plan(path), kept)
     write_plan(kept, path)
     assert equal(read_plan(path), kept)
+    (end, *_) = (s.get('end') for s in json.loads(path.read_text(encoding='utf-8'))['segments'])
+    assert end == {'event': 'contacts', 'made': [], 'broken': ['object.e1|left.tip.v1']}
+
+
+@pytest.mark.parametrize(
+    ('key', 'value', 'said'),
+    [
+        ('made', ['object.v9|palm.0.e2'], 'end.made: got ["object.v9|palm.0.e2"], expected [],'),
+        ('broken', [], "end.broken: got [], expected ['object.e1|left.tip.v1']"),
+        ('event', 'goal', "end.event: got 'goal', expected 'contacts'"),
+    ],
+)
+def test_an_end_that_contradicts_the_contacts_is_refused(
+    key: str, value: object, said: str, spoil: Callable[[Callable[[Any], object]], str]
+) -> None:
+    def change(document: Any) -> None:
+        end = {'event': 'contacts', 'made': [], 'broken': ['object.e1|left.tip.v1']}
+        document['segments'][0]['end'] = {**end, key: value}
+
+    assert said in spoil(change)
 
 
 @pytest.mark.parametrize('status', [s for s in Status if s is not Status.SOLVED])

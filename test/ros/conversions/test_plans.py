@@ -28,7 +28,7 @@ from cfplan_core import (
     plan,
 )
 from cfplan_core.trajectory.plan_result import TreeNode
-from cfplan_core.trajectory.timing import joint_velocities
+from cfplan_core.trajectory.timing import joint_velocities, rest_frames
 from cfplan_ros.conversions.plans import plan_message, plan_result, refusal, response_of
 from cfplan_ros.conversions.times import nanoseconds_of
 
@@ -174,7 +174,8 @@ def test_an_example_can_be_followed_by_a_controller(
 
 def test_velocities_are_the_slopes_of_the_plan(story_plan: PlanResult) -> None:
     points = plan_message(story_plan, 'palm', STAMP).joint_trajectory.points
-    expected = joint_velocities(story_plan.times, story_plan.joints)
+    rests = rest_frames(story_plan.joints, story_plan.segments)
+    expected = joint_velocities(story_plan.times, story_plan.joints, rests)
     assert np.array([point.velocities for point in points]).tobytes() == expected.tobytes()
     assert not any(len(point.accelerations) or len(point.effort) for point in points)
 
