@@ -58,13 +58,15 @@ def print_executions(problem: Problem, preference: str, result: PlanResult) -> N
 
 
 def print_trials(problem: Problem, preference: str, result: PlanResult, count: int) -> None:
-    cells = []
-    for roles in (False, True):
-        executor = Executor(problem, result, ExecutionOptions(ERRORS, roles=roles))
-        success = run_trials(executor, count).success
-        low, high = success.interval
-        cells.append(f'{success.successes} of {count}, {low:.0%} to {high:.0%}')
-    print(f'| {problem.name} | {preference} | {" | ".join(cells)} |', flush=True)
+    trials = run_trials(Executor(problem, result, ExecutionOptions(ERRORS)), count)
+    low, high = trials.success.interval
+    losses = trials.first_losses().most_common(1)
+    lost = f'`{losses[0][0][1]}` in segment {losses[0][0][0] + 1}' if losses else ''
+    print(
+        f'| {problem.name} | {preference} | {trials.success.successes} of {count} '
+        f'| {low:.0%} to {high:.0%} | {lost} |',
+        flush=True,
+    )
 
 
 if __name__ == '__main__':
