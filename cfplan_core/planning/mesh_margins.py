@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.system import BoolArray
+from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.mesh import Mesh, Motion
 from cfplan_core.planning.near_misses import TOUCHING, distances
-from cfplan_core.planning.robustness import COMFORTABLE_CLEARANCE, Robustness
+from cfplan_core.planning.robustness import COMFORTABLE_CLEARANCE, Robustness, finer
 
 # Motions that are measured at once.
 _AT_ONCE = 4000
@@ -92,11 +92,11 @@ class MeshMargins:
                 checkpoint()
                 some = members[first : first + _AT_ONCE]
                 parts = [mesh.motions[k].points for k in some]
-                points = expanded(np.concatenate(parts))
-                begins = np.cumsum([0, *(len(part) for part in parts[:-1])])
                 if formation is not None:
-                    steady = robustness.steady(formation, points)
-                    self.steady[some] = np.minimum.reduceat(steady, begins)
+                    inner = [finer(part) for part in parts]
+                    steady = robustness.steady(formation, expanded(np.concatenate(inner)))
+                    self.steady[some] = np.minimum.reduceat(steady, _begins(inner))
+                points, begins = expanded(np.concatenate(parts)), _begins(parts)
                 distance, passing = distances(system, points)
                 self._touches[some] = np.logical_or.reduceat(distance < TOUCHING, begins, axis=0)
                 passing[begins[1:] - 1] = np.inf
@@ -113,6 +113,11 @@ class MeshMargins:
             _bits(self._at_nodes < near),
             {self._motions[k]: (passing[n], touching[n]) for n, k in enumerate(wide.tolist())},
         )
+
+
+def _begins(parts: Sequence[FloatArray]) -> IntArray:
+    """Where parts begin when they are put together, shape (m,)."""
+    return np.cumsum([0, *(len(part) for part in parts[:-1])])
 
 
 def _bits(sets: BoolArray) -> list[int]:

@@ -48,7 +48,11 @@ class _State:
 
 
 class MeshSearch:
-    """Searches a mesh."""
+    """Searches a mesh.
+
+    Attributes:
+        banned: Motions that are left out.
+    """
 
     def __init__(
         self,
@@ -67,6 +71,7 @@ class MeshSearch:
             constraints: Say which formations are required.
             lengths: Of the joints' paths, rad.
         """
+        self.banned: set[Motion] = set()
         self._mesh = mesh
         self._start = start
         self._goals = frozenset(goals)
@@ -86,7 +91,6 @@ class MeshSearch:
         prefer: Preference = Preference.SHORTEST,
         floor: float | None = None,
         margins: MeshMargins | None = None,
-        banned: Collection[Motion] = (),
     ) -> Way | None:
         """Find the shortest way.
 
@@ -94,7 +98,6 @@ class MeshSearch:
             prefer: Fewest segments come first if this says so.
             floor: Smallest margin of the way.
             margins: Needed with a floor.
-            banned: Motions that are left out.
         """
         first_of_all = prefer is Preference.FEWEST_SEGMENTS
         marks = margins.marks(floor) if margins is not None and floor is not None else None
@@ -113,7 +116,7 @@ class MeshSearch:
             if state.node in self._goals and state.passed == self._all_passed:
                 return self._traced(state, came)
             for other, motion in self._mesh.around[state.node]:
-                if motion in banned:
+                if motion in self.banned:
                     continue
                 touched = 0
                 if marks is not None:
@@ -171,7 +174,7 @@ class MeshSearch:
                 return -so_far
             for other, motion in self._mesh.around[node]:
                 through = min(-so_far, width[motion])
-                if through > best[other]:
+                if motion not in self.banned and through > best[other]:
                     best[other] = through
                     heapq.heappush(queue, (-through, other))
         return 0.0

@@ -33,6 +33,8 @@ _COMFORTABLE_HOLD = 0.2
 COMFORTABLE_CLEARANCE = 0.1
 _COMFORTABLE_TORQUE = 0.2
 _COMFORTABLE_LIMIT = 0.1
+# Step, in radians and object sizes, at which margins are looked at.
+_FINE = 0.01
 
 
 class Ratios(NamedTuple):
@@ -87,7 +89,7 @@ class Robustness:
 
         No more than the smallest of theirs: a near miss may take more than one.
         """
-        steady = min(float(self.steady(formation, z).min()) for formation, z in legs)
+        steady = min(float(self.steady(formation, finer(z)).min()) for formation, z in legs)
         return min(steady, float(self._clearance([z for _, z in legs]).min()))
 
     def _steady(
@@ -122,3 +124,18 @@ class Robustness:
         upper = np.minimum(upper + weight, self._effort)
         widths = np.sort(np.nan_to_num(np.maximum(upper - lower, 0.0)), axis=1)
         return np.asarray(widths[:, -min(spare, joints)])
+
+
+def finer(z: FloatArray) -> FloatArray:
+    """Points with more between them, on straight lines: margins have sharp minima.
+
+    Args:
+        z: Shape (s, 3 + n), successive points.
+    """
+    steps = np.diff(z, axis=0)
+    parts = np.ceil(np.abs(steps).max(axis=1) / _FINE).astype(int) if len(z) > 1 else []
+    inner = [
+        begin + np.arange(count)[:, None] / max(count, 1) * step
+        for begin, step, count in zip(z, steps, parts, strict=False)
+    ]
+    return np.concatenate([*inner, z[-1:]])
