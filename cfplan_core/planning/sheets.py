@@ -268,7 +268,9 @@ class Sheets(Regions):
             table = self._table(formation, some[0].z)
             starts = np.array([border.z for border in some])
             joints = np.array([self.grid.joints(border.beyond) for border in some])
-            crossed = step_across(self._roadmap.tracer, formation, table.rows, starts, joints)
+            departing = [onwards[number][1].departing for number in numbers]
+            tracer = self._roadmap.tracer
+            crossed = step_across(tracer, formation, table.rows, starts, joints, departing)
             for number, points in zip(numbers, crossed, strict=True):
                 border, way = onwards[number]
                 place = border.beyond
