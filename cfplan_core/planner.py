@@ -23,6 +23,7 @@ from cfplan_core.planning.constraints import (
     compile_constraints,
     contradictions,
 )
+from cfplan_core.planning.equations import formation_rows
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.manifold import settle
@@ -99,7 +100,7 @@ class _Planning:
         self.began = time.perf_counter()
         self.system = ContactSystem(problem)
         self.moving = self.system
-        self.model = FrictionlessModel(self.system.load)
+        self.model = FrictionlessModel(self.system.load, self.options.second_order)
         self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
         self.search: Search | BestFirst | None = None
 
@@ -127,7 +128,7 @@ class _Planning:
             if examined.goal is not None:
                 goal = self.moving.reduced(examined.goal.z)
                 if self.options.held_joints:
-                    goal = settle(self.moving, goal, examined.goal.pairs)
+                    goal = settle(self.moving, goal, formation_rows(examined.goal.pairs))
             else:
                 goal = GoalTest(self.moving, self._free_goal())
         except CfplanError as error:

@@ -27,6 +27,16 @@ def resolution_option(command: click.decorators.FC) -> click.decorators.FC:
     )(command)
 
 
+def second_order_option(command: click.decorators.FC) -> click.decorators.FC:
+    """Option for grasps that are stable to second order."""
+    return click.option(
+        '--second-order/--no-second-order',
+        default=True,
+        show_default=True,
+        help='Whether two contacts may hold the object at a strict minimum of its energy.',
+    )(command)
+
+
 @click.command(short_help='List all contact formations that can be reached.')
 @click.argument('file', metavar='PROBLEM', type=click.Path(path_type=Path))
 @click.option(
@@ -44,7 +54,14 @@ def resolution_option(command: click.decorators.FC) -> click.decorators.FC:
     help="Write the graph as JSON, in networkx's node-link form.",
 )
 @resolution_option
-def explore(file: Path, dot_path: Path | None, json_path: Path | None, resolution: float) -> int:
+@second_order_option
+def explore(
+    file: Path,
+    dot_path: Path | None,
+    json_path: Path | None,
+    resolution: float,
+    second_order: bool,
+) -> int:
     """List all contact formations, and the transitions between them, that can be reached.
 
     For the start grasp of a PROBLEM with a hand of one or two joints. A formation is listed once
@@ -54,7 +71,7 @@ def explore(file: Path, dot_path: Path | None, json_path: Path | None, resolutio
     """
     from cfplan_core.exploration import explore as explore_problem
 
-    explored = explore_problem(examine(file).valid_problem(), resolution)
+    explored = explore_problem(examine(file).valid_problem(), resolution, second_order)
     if dot_path is not None or json_path is not None:
         from cfplan_core.report.graph_files import write_dot, write_json
 

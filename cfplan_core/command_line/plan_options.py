@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 
 import click
 
+from cfplan_core.command_line.explore import second_order_option
+
 PREFERENCES = ('first', 'fewest-segments', 'shortest', 'robust')
 
 Command = TypeVar('Command', bound=Callable[..., Any])
@@ -106,6 +108,7 @@ def wanted_plan(command: Command) -> Command:
             metavar="'X,Y X,Y X,Y...'",
             help='Keep the object inside this convex polygon: corners in m, counter-clockwise.',
         ),
+        second_order_option,
     ]
     for option in reversed(options):
         command = option(command)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from cfplan_core.contact.elements import parse_contact
-from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Goal
-from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
+from cfplan_core.planning.manifold import formation_equations, project, tangent_basis
 from cfplan_core.planning.pieces import SAME, Piece
 from cfplan_core.planning.tracing import STEP
 
@@ -89,12 +88,11 @@ class GoalTest:
         """Gauss-Newton steps along a piece to where the wanted coordinates are nearest."""
         pairs = piece.formation.array
         for _ in range(_ITERATIONS):
-            gradients = gap_gradients(self._system, self._system.place(z[None]), pairs)[0]
-            rows = list(independent_rows(gradients))
-            basis = tangent_basis(gradients[rows])
+            rows, gradients = formation_equations(self._system, pairs, z)
+            basis = tangent_basis(gradients)
             off = self.wanted - z[self.columns]
             along = np.linalg.lstsq(basis[:, self.columns].T, off, rcond=1e-9)[0]
-            found = project(self._system, pairs[rows], z, basis, (z + along @ basis)[None])
+            found = project(self._system, rows, z, basis, (z + along @ basis)[None])
             if not found.converged[0]:
                 break
             z = found.points[0]
