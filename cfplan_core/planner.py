@@ -22,8 +22,9 @@ from cfplan_core.planning.constraints import (
     compile_constraints,
     contradictions,
 )
+from cfplan_core.planning.goal_limits import why_impossible
 from cfplan_core.planning.goal_test import GoalTest
-from cfplan_core.planning.grasp_check import examine_problem
+from cfplan_core.planning.grasp_check import ExaminedProblem, examine_problem
 from cfplan_core.planning.manifold import settle
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
@@ -120,29 +121,42 @@ class _Planning:
         plain = constraints.none and self.moving is self.system
         resolution = self.options.resolution if plain and not self.options.optimal else None
         self.roadmap = Roadmap(self.moving, self.model, self._checkpoint, constraints, resolution)
-        goal: FloatArray | GoalTest
         try:
-            if examined.goal is not None:
-                goal = self.moving.reduced(examined.goal.z)
-                if self.options.held_joints:
-                    goal = settle(self.moving, goal, examined.goal.pairs)
-            else:
-                goal = GoalTest(self.moving, self._free_goal())
+            goals = self._goals(examined)
         except CfplanError as error:
             return self._answer(Status.INVALID, f'goal: {error}')
+        impossible = '' if examined.goal is not None else why_impossible(self.problem, self._goal)
+        if impossible:
+            return self._answer(Status.INFEASIBLE, f'no path: {impossible}')
         try:
             if self.options.optimal:
-                best = self._search_best(start, goal)
+                # Best is what is best of all that the goal allows.
+                best = self._search_best(start, goals[-1])
                 if best is not None:
                     return best
                 legs = None
             else:
-                legs = self._search(start, goal)
+                found = (self._search(start, goal) for goal in goals)
+                legs = next((legs for legs in found if legs is not None), None)
         except _BudgetExhaustedError as stop:
             return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
         if legs is None:
-            return self._answer(Status.INFEASIBLE, f'no path; {self._explored()}{self._doubt()}')
+            nearest = goals[-1].how_near() if isinstance(goals[-1], GoalTest) else ''
+            message = f'no path{nearest}; {self._explored()}{self._doubt()}'
+            return self._answer(Status.INFEASIBLE, message)
         return self._solved(legs, '')
+
+    def _goals(self, examined: ExaminedProblem) -> list[FloatArray | GoalTest]:
+        """The goal grasp, if it is one, and all that its tolerance allows, if that is more."""
+        goals: list[FloatArray | GoalTest] = []
+        if examined.goal is not None:
+            z = self.moving.reduced(examined.goal.z)
+            if self.options.held_joints:
+                z = settle(self.moving, z, examined.goal.pairs)
+            goals.append(z)
+        if examined.goal is None or self._goal.tolerance.wide:
+            goals.append(GoalTest(self.moving, self._goal))
+        return goals
 
     def _solved(self, legs: Sequence[Leg], message: str) -> PlanResult:
         """The answer for a path, with the trees of the search that found it."""
@@ -160,7 +174,8 @@ class _Planning:
             entry_upper=frames.entry_upper,
         )
 
-    def _free_goal(self) -> Goal:
+    @property
+    def _goal(self) -> Goal:
         """The goal without the angles of held joints, which agree with the start's."""
         goal, held = self.problem.goal, self.options.held_joints
         if not held or goal.joints is None:

@@ -389,7 +389,7 @@ def test_unknown_joint_is_found_with_the_nearest_one(grasp):
 def test_goal_of_nothing_but_a_tolerance_is_found():
     finding = only_finding((('goal',), {'tolerance': {'angle': 0.1}}))
     assert finding.field == 'goal'
-    assert 'at least one of object_pose, joints and contacts' in finding.expected
+    assert 'at least one of object_pose, position, orientation, joints' in finding.expected
 
 
 @pytest.mark.parametrize(
