@@ -17,6 +17,7 @@ from cfplan_core.model import Goal, Problem
 from cfplan_core.options import PlanOptions as PlanOptions
 from cfplan_core.options import Preference
 from cfplan_core.planning.best_first import BestFirst
+from cfplan_core.planning.best_on_mesh import Best, BestOnMesh
 from cfplan_core.planning.constraints import (
     REASONS,
     compile_constraints,
@@ -51,6 +52,8 @@ class Progress:
     message: str
 
 
+# Hands that everything is explored for.
+MOST_JOINTS = 2
 TOO_WEAK = 'a joint would exceed its effort limit'
 
 
@@ -117,9 +120,8 @@ class _Planning:
         if self.options.held_joints:
             self.moving = HeldSystem(self.system, self.options.held_joints, start)
             start = self.moving.reduced(start)
-        # Sheets know of no constraint, and the search for the best plan moves straight.
-        plain = constraints.none and self.moving is self.system
-        resolution = self.options.resolution if plain and not self.options.optimal else None
+        # Alternatives are told apart along rays.
+        resolution = self.options.resolution if self.options.alternatives == 1 else None
         self.roadmap = Roadmap(self.moving, self.model, self._checkpoint, constraints, resolution)
         try:
             goals = self._goals(examined)
@@ -130,8 +132,10 @@ class _Planning:
             return self._answer(Status.INFEASIBLE, f'no path: {impossible}')
         try:
             if self.options.optimal:
+                exact = self.options.alternatives == 1 and self.moving.joint_count <= MOST_JOINTS
+                search = self._search_all if exact else self._search_best
                 # Best is what is best of all that the goal allows.
-                best = self._search_best(start, goals[-1])
+                best = search(start, goals[-1])
                 if best is not None:
                     return best
                 legs = None
@@ -198,6 +202,11 @@ class _Planning:
         def rate(formation: Formation, z: FloatArray) -> float:
             return robustness.ratios(formation, self.moving.expanded(z)).worst
 
+        def margin_of(legs: Sequence[Leg]) -> float:
+            return robustness.margin(
+                [(leg.formation, self.moving.expanded(leg.points)) for leg in legs]
+            )
+
         def settled(states: int) -> None:
             self._grown(states, 1)
 
@@ -218,13 +227,56 @@ class _Planning:
         for label in best.chosen:
             best.conclude(label)
             legs, _ = label.path()
-            results.append(replace(self._solved(legs, message), margin=best.margin(legs)))
+            results.append(replace(self._solved(legs, message), margin=margin_of(legs)))
         if not results and first is not None:
             self.search = first_search
-            results = [replace(self._solved(first, message), margin=best.margin(first))]
+            results = [replace(self._solved(first, message), margin=margin_of(first))]
         if not results and stopped:
             raise _BudgetExhaustedError(stopped)
         return replace(results[0], alternatives=tuple(results[1:])) if results else None
+
+    def _search_all(self, start: FloatArray, goal: FloatArray | GoalTest) -> PlanResult | None:
+        """Search everything that can be reached for the best plan; None if there is none."""
+        prefer, stopped, best = self.options.prefer, '', None
+        robustness = Robustness(self.system, self.model)
+        first = None
+        if not self.options.required:
+            first = self._search(start, goal)
+            if first is None:
+                return None
+        try:
+            mesh = BestOnMesh(
+                self.roadmap, start, goal, robustness, self.moving.expanded, self._met
+            )
+            best = mesh.choose(prefer, first, self._refuse)
+            if best is None:
+                return None
+        except _BudgetExhaustedError as stop:
+            if first is None:
+                raise
+            stopped = str(stop)
+        legs = first if best is None else best.legs
+        assert legs is not None
+        whole = [(leg.formation, self.moving.expanded(leg.points)) for leg in legs]
+        margin = robustness.margin(whole)
+        message = self._verdict_of_all(stopped, margin, best)
+        return replace(self._solved(legs, message), margin=margin)
+
+    def _met(self, pieces: int) -> None:
+        self._grown(pieces, 1)
+
+    def _verdict_of_all(self, stopped: str, margin: float, best: Best | None) -> str:
+        """Say whether a plan is the best of all that can be reached, and at what resolution."""
+        prefer = self.options.prefer
+        name = Preference.FEWEST_SEGMENTS if prefer is Preference.FIRST else prefer
+        if stopped:
+            return f'{name.value}: the best found so far; {stopped}'
+        bound = ''
+        if best is not None and best.bound is not None:
+            bound = (
+                f', whose margin is {margin:.3f} where {best.bound:.3f} is the most there can be'
+            )
+        return f'{name.value}: none better exists{bound}; {self.roadmap.regions.coverage()}'
 
     def _refuse(self, legs: Sequence[Leg]) -> list[int]:
         """Which legs cannot be held, with the reasons noted."""

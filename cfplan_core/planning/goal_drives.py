@@ -65,7 +65,7 @@ def drive(
 
 
 def drives(
-    tracer: Tracer, region: Region, goal: GoalRegion, near: FloatArray
+    tracer: Tracer, region: Region, goal: GoalRegion, near: FloatArray | None
 ) -> Iterator[FloatArray]:
     """Ways from a region's anchor to configurations within a goal's tolerances.
 
@@ -77,7 +77,7 @@ def drives(
         tracer: Knows system and model.
         region: Explored from its anchor.
         goal: What is looked for.
-        near: Where the region is entered, shape (3 + n,).
+        near: Where the region is entered, shape (3 + n,), if that matters.
 
     Yields:
         Points from the anchor, shape (s, 3 + n).
@@ -97,12 +97,12 @@ def drives(
             yield np.concatenate([way, points[1:]])
 
 
-def _starts(region: Region, goal: GoalRegion, near: FloatArray) -> Iterator[FloatArray]:
+def _starts(region: Region, goal: GoalRegion, near: FloatArray | None) -> Iterator[FloatArray]:
     """Ways from the anchor to places to drive from: that near the entry, then the best."""
     ways = [points for _, points in region.links if len(points) > 1]
-    entering = min(ways, key=lambda way: float(np.abs(way[-1] - near).max()), default=None)
     taken = [region.anchor]
-    if entering is not None:
+    if near is not None and ways:
+        entering = min(ways, key=lambda way: float(np.abs(way[-1] - near).max()))
         inside = np.flatnonzero(np.abs(entering - entering[-1]).max(axis=1) >= _INSIDE)
         if len(inside) and inside[-1] > 0:
             taken.append(entering[inside[-1]])

@@ -103,14 +103,39 @@ class GoalTest:
         if held and self.fits(entry):
             yield entry
             return
-        least, most = curve.comfortable() if self.region.pairs else (0.0, np.inf)
-        for low, high in curve.stretches():
-            inner = np.clip((low, high), least, most)
-            if not low <= inner[0] <= inner[1] <= high:
-                inner = np.array([low, high])
-            z = curve.at(np.clip([begin], *inner))[0]
+        for stretch in self._inner_stretches(curve):
+            z = curve.at(np.clip([begin], *stretch))[0]
             if self.fits(z):
                 yield z
+
+    def everywhere(self, piece: Piece, regions: Regions) -> Iterator[FloatArray]:
+        """Configurations all over where a piece fulfils the goal, in a curve's and grid's steps.
+
+        Args:
+            piece: To look at.
+            regions: Know how to move in regions.
+        """
+        if not self.may_hold(piece):
+            return
+        if isinstance(piece, Region):
+            yield from self._in_region(piece, regions, None)
+            return
+        self._note(piece.points)
+        if piece.dimension == 0:
+            yield from (z for z in piece.points if self.fits(z))
+            return
+        curve = CurveGoal(self._system, self.region, piece)
+        for low, high in self._inner_stretches(curve):
+            between = np.arange(np.floor(low) + 1.0, np.ceil(high))
+            places = np.concatenate([[low], between, [high] if high > low else []])
+            yield from (z for z in curve.at(places) if self.fits(z))
+
+    def _inner_stretches(self, curve: CurveGoal) -> Iterator[tuple[float, float]]:
+        """Stretches of a curve that fulfil the goal, with contacts away from the curve's ends."""
+        least, most = curve.comfortable() if self.region.pairs else (0.0, np.inf)
+        for low, high in curve.stretches():
+            inner = float(np.clip(low, least, most)), float(np.clip(high, least, most))
+            yield inner if low <= inner[0] <= inner[1] <= high else (low, high)
 
     def may_hold(self, piece: Piece) -> bool:
         """Tell whether a piece has the contacts wanted."""
@@ -136,7 +161,7 @@ class GoalTest:
         return f'; nearest to the goal: {self.region.describe(self.nearest)}'
 
     def _in_region(
-        self, piece: Region, regions: Regions, entry: FloatArray
+        self, piece: Region, regions: Regions, entry: FloatArray | None
     ) -> Iterator[FloatArray]:
         if self.may_hold(piece):
             self._note(configurations(piece))

@@ -97,13 +97,16 @@ class Regions:
                     if apart(at) or (piece is not region and index != region.index)
                 ]
 
-    def reach(self, region: Region, goal: GoalRegion, near: FloatArray) -> Iterator[FloatArray]:
+    def reach(
+        self, region: Region, goal: GoalRegion, near: FloatArray | None
+    ) -> Iterator[FloatArray]:
         """Configurations inside a region that have a goal's coordinates.
 
         Args:
             region: Of this roadmap, with the goal's contacts.
             goal: What is looked for.
-            near: Where the region is entered, shape (3 + n,).
+            near: Where the region is entered, shape (3 + n,), to find what is near first; None
+                to find what there is all over it.
 
         Yields:
             Shape (3 + n,), linked to the region's anchor.

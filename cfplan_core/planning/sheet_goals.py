@@ -29,7 +29,7 @@ _MOST_DRIVES = 40
 
 
 def goals_on_sheet(
-    tracer: Tracer, sheet: Sheet, rows: IntArray, goal: GoalRegion, near: FloatArray
+    tracer: Tracer, sheet: Sheet, rows: IntArray, goal: GoalRegion, near: FloatArray | None
 ) -> Iterator[FloatArray]:
     """Ways from a vertex to configurations on a sheet that fulfil a goal's coordinates.
 
@@ -41,13 +41,15 @@ def goals_on_sheet(
         sheet: With vertices over the grid.
         rows: Three of its contacts that are independent for fixed joints, shape (3,).
         goal: What is looked for; the sheet has its contacts.
-        near: Where the sheet is entered, shape (3 + n,).
+        near: Where the sheet is entered, shape (3 + n,); None for all ways, in no order.
 
     Yields:
         Points, shape (s, 3 + n), the first a vertex.
     """
     vertices = np.array(sheet.vertices)
-    order = _order(tracer, sheet, vertices, near)
+    order = list(range(len(vertices)))
+    if near is not None:
+        order = _order(tracer, sheet, vertices, near)
     if not goal.count:
         yield from (vertices[k][None] for k in order)
         return
@@ -57,6 +59,9 @@ def goals_on_sheet(
     ratios = goal.ratios(vertices)
     within = ratios <= 1.0
     lowest = [k for k in order if within[k] or _is_lowest(sheet, ratios, k)]
+    if near is None:
+        yield from (vertices[k][None] for k in np.flatnonzero(within))
+        lowest = [k for k in lowest if not within[k]]
     for k in lowest[:_MOST_DRIVES]:
         points = drive(tracer, sheet, goal, vertices[k], longest=1.0)
         if points is not None:

@@ -72,7 +72,9 @@ class Sheets(Regions):
         """Return the sheet of a formation that a stable configuration lies on."""
         return self._join(formation, z, z[None])
 
-    def reach(self, region: Region, goal: GoalRegion, near: FloatArray) -> Iterator[FloatArray]:
+    def reach(
+        self, region: Region, goal: GoalRegion, near: FloatArray | None
+    ) -> Iterator[FloatArray]:
         """Configurations on a sheet that have a goal's coordinates; see `Regions.reach`."""
         assert isinstance(region, Sheet)
         if region.places == [None]:
