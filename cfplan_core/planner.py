@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.held import HeldSystem
 from cfplan_core.contact.system import ContactSystem
-from cfplan_core.errors import CfplanError
+from cfplan_core.errors import CfplanError, Finding
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Goal, Problem
@@ -109,13 +109,13 @@ class _Planning:
         try:
             constraints = compile_constraints(self.system, self.model, self.options)
         except CfplanError as error:
-            return self._answer(Status.INVALID, f'options: {error}')
+            return self._invalid(f'options: {error}', 'options')
         findings = examined.findings or contradictions(
             constraints, self.system, examined, self.problem.goal, self.options.held_joints
         )
         if findings:
             message = '\n'.join(str(finding) for finding in findings)
-            return self._answer(Status.INVALID, message)
+            return replace(self._answer(Status.INVALID, message), findings=tuple(findings))
         start = examined.start.z
         if self.options.held_joints:
             self.moving = HeldSystem(self.system, self.options.held_joints, start)
@@ -126,7 +126,7 @@ class _Planning:
         try:
             goals = self._goals(examined)
         except CfplanError as error:
-            return self._answer(Status.INVALID, f'goal: {error}')
+            return self._invalid(f'goal: {error}', 'goal')
         impossible = '' if examined.goal is not None else why_impossible(self.problem, self._goal)
         if impossible:
             return self._answer(Status.INFEASIBLE, f'no path: {impossible}')
@@ -161,6 +161,18 @@ class _Planning:
         if examined.goal is None or self._goal.tolerance.wide:
             goals.append(GoalTest(self.moving, self._goal))
         return goals
+
+    def _invalid(self, message: str, part: str) -> PlanResult:
+        """The answer where a part, ``options`` or ``goal``, names what the problem lacks.
+
+        An error of the options begins with the option's name.
+        """
+        text = message.removeprefix(f'{part}: ')
+        name, _, rest = text.partition(': ')
+        finding = Finding('<problem>', part, text, '')
+        if part == 'options' and name.isidentifier():
+            finding = Finding('<problem>', f'{part}.{name}', rest, '')
+        return replace(self._answer(Status.INVALID, message), findings=(finding,))
 
     def _solved(self, legs: Sequence[Leg], message: str) -> PlanResult:
         """The answer for a path, with the trees of the search that found it."""

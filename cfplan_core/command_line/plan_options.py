@@ -1,4 +1,4 @@
-"""Options of ``cfplan plan`` that say which plan is wanted."""
+"""Options of ``cfplan plan`` and ``cfplan call`` that say which plan is wanted."""
 
 from __future__ import annotations
 
@@ -45,6 +45,18 @@ def corners(
             raise click.BadParameter(f'{corner!r} is no corner x,y in m.') from None
         read.append((x, y))
     return tuple(read)
+
+
+def resolution_option(command: click.decorators.FC) -> click.decorators.FC:
+    """Option for the spacing of the grid of joint angles."""
+    return click.option(
+        '--resolution',
+        type=click.FloatRange(0.001, 1.0),
+        default=0.05,
+        show_default=True,
+        metavar='RAD',
+        help='Spacing of the grid of joint angles that regions are explored over.',
+    )(command)
 
 
 def wanted_plan(command: Command) -> Command:
@@ -107,6 +119,6 @@ def wanted_plan(command: Command) -> Command:
             help='Keep the object inside this convex polygon: corners in m, counter-clockwise.',
         ),
     ]
-    for option in reversed(options):
+    for option in reversed([*options, resolution_option]):
         command = option(command)
     return command
