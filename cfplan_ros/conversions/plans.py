@@ -87,7 +87,7 @@ def plan_message(result: PlanResult, frame_id: str, stamp: Time) -> Manipulation
         problem_name=result.problem,
         joint_trajectory=JointTrajectory(header=Header(stamp=stamp)),
         torque_limits=JointTorqueLimits(header=Header(stamp=stamp)),
-        margin=math.nan if result.margin is None else float(result.margin),
+        margin=array('d', [] if result.margin is None else [result.margin]),
         initial_tree=tree_message(result.trees[0]),
         goal_tree=tree_message(result.trees[1]),
         explored_formations=int(statistics.formations),
@@ -223,7 +223,7 @@ def _outcome(
             transitions=int(plan.tried_transitions),
         ),
         trees=trees,
-        margin=None if math.isnan(plan.margin) else float(plan.margin),
+        margin=float(plan.margin[0]) if len(plan.margin) else None,
     )
     return _with_frames(result, plan, field) if result.solved else result
 

@@ -108,7 +108,8 @@ def test_answer_is_printed_and_written_as_the_planner_alone_does_it(
     assert (tmp_path / 'runs' / record.split()[-1]).exists()
     for suffix in ('', '.2') if '--alternatives' in options else ('',):
         first, second = (
-            json.loads((tmp_path / f'{name}{suffix}.json').read_text()) for name in ('call', 'plan')
+            json.loads((tmp_path / f'{name}{suffix}.json').read_text())
+            for name in ('call', 'plan')
         )
         assert first['frames'] == second['frames']
         assert first['segments'] == second['segments']

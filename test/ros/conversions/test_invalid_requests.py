@@ -260,7 +260,8 @@ def test_an_empty_goal_is_refused() -> None:
             'request',
             'goal',
             'nothing',
-            'at least one of object_pose, joints and contact_formation.contacts',
+            'at least one of object_pose, object_position, object_angle, joints and '
+            'contact_formation.contacts',
         ),
     )
 
