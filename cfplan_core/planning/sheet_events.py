@@ -143,7 +143,7 @@ def locate_first(
     near[:, formation.array] = False
     start_gap = gaps(system, system.place(before), slice(None)).gap
     clean = np.asarray(~(near & (start_gap > _NEAR)).any(axis=1))
-    margins = tracer.model.margins(gap_gradients(system, placed, formation.array))
+    margins = tracer.judge(z, gap_gradients(system, placed, formation.array))
     holds = margins.stable > STABILITY_MARGIN
     links = is_gap & (happenings.pair >= system.contact_count)
     for k in first[real[first] & clean[first]]:

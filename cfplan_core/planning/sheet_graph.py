@@ -25,11 +25,13 @@ class Border:
     Attributes:
         vertex: Index of the vertex.
         points: Shape (s, 3 + n), from the vertex to the border.
+        beyond: Node of the grid that the step led to.
         changes_class: True where only the stability class changes.
     """
 
     vertex: int
     points: FloatArray
+    beyond: Place
     changes_class: bool = False
 
     @property

@@ -23,6 +23,7 @@ from cfplan_core.planning.joint_grid import JointGrid, Place
 from cfplan_core.planning.manifold import independent_rows, project
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.regions import Regions, _heading
+from cfplan_core.planning.sheet_crossing import step_across
 from cfplan_core.planning.sheet_filling import Table, fill
 from cfplan_core.planning.sheet_goals import goals_on_sheet
 from cfplan_core.planning.sheet_graph import Border, Sheet
@@ -137,7 +138,7 @@ class Sheets(Regions):
             if way.arrived:
                 return self._linked(table, corner, level, z, way.points[:0:-1], inward)
             if way.leads_on and len(way.points) > 1:
-                borders.append(Border(0, way.points, way.changes_class))
+                borders.append(Border(0, way.points, corner, way.changes_class))
         return self._sliver(table, z, inward, borders)
 
     def _linked(
@@ -218,16 +219,46 @@ class Sheets(Regions):
         if region.places == [None]:
             # A strip narrower than the grid may be long.
             yield from super()._shoot(region)
+        found: list[tuple[FloatArray, Piece]] = []
+        onwards: list[tuple[Border, Departure]] = []
         for border in region.borders:
             self._roadmap.attempts += 1
             z = border.z
             region.links.append((z, border.points))
             if not border.changes_class and self._joins(region, z):
-                yield z, self._roadmap.root(z)
+                found.append((z, self._roadmap.root(z)))
             elif np.abs(border.points - z).max() > SAME:
                 heading = _heading(border.points)
-                onwards = [Departure(region.formation, heading, frozenset())]
-                for way in onwards if border.changes_class else self._ways(region, z, heading):
-                    entered = self._enter(z, way)
-                    if entered is not None and entered is not region:
-                        yield z, entered
+                if border.changes_class:
+                    onwards.append((border, Departure(region.formation, heading, frozenset())))
+                else:
+                    onwards += [(border, way) for way in self._ways(region, z, heading)]
+        yield from found
+        yield from self._cross(region, onwards)
+
+    def _cross(
+        self, region: Sheet, onwards: list[tuple[Border, Departure]]
+    ) -> Iterator[tuple[FloatArray, Piece]]:
+        """Enter sheets over borders, to the nodes that the steps led to where that is possible."""
+        alike: dict[Formation, list[int]] = {}
+        for number, (_, way) in enumerate(onwards):
+            alike.setdefault(way.formation, []).append(number)
+        for formation, numbers in alike.items():
+            some = [onwards[number][0] for number in numbers]
+            table = self._table(formation, some[0].z)
+            starts = np.array([border.z for border in some])
+            joints = np.array([self.grid.joints(border.beyond) for border in some])
+            departing = [onwards[number][1].departing for number in numbers]
+            tracer = self._roadmap.tracer
+            crossed = step_across(tracer, formation, table.rows, starts, joints, departing)
+            for number, points in zip(numbers, crossed, strict=True):
+                border, way = onwards[number]
+                place = border.beyond
+                entered: Region | None
+                known = points is not None and table.find(place, points[-1]) is not None
+                if points is not None and (known or self.grid.is_coarse(place)):
+                    entered = self._linked(table, place, 0, border.z, points[:1:-1], points[:2])
+                else:
+                    entered = self._enter(border.z, way)
+                if entered is not None and entered is not region:
+                    yield border.z, entered
