@@ -51,12 +51,10 @@ class Exploration:
 
     def others(self) -> list[Piece]:
         """Pieces that cannot be reached from the start, but from the goal, if that is a grasp."""
-        goal = self.problem.goal.grasp(self.problem.hand)
+        goal = examine_problem(self.system, self.roadmap.model).goal
         if goal is None or self.goal is not None:
             return []
-        z = examine_problem(self.system, self.roadmap.model).goal
-        assert z is not None
-        graph = _reachable(self.roadmap, self.roadmap.root(z.z))
+        graph = _reachable(self.roadmap, self.roadmap.root(goal.z))
         return [self.roadmap.pieces[index] for index in sorted(graph)]
 
 

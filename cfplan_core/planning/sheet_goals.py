@@ -94,9 +94,11 @@ def _crossings(
     order: list[int],
 ) -> Iterator[FloatArray]:
     """Where the only coordinate of a goal has its value on a step between vertices."""
+    done: set[int] = set()
     for first in order:
+        done.add(first)
         for second in sheet.edges[first]:
-            if not offsets[first] * offsets[second] <= 0.0:
+            if second in done or not offsets[first] * offsets[second] <= 0.0:
                 continue
             begin, end = vertices[first], vertices[second]
             if offsets[first] == 0.0:
