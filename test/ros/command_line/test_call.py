@@ -88,8 +88,8 @@ def tilted_story(tmp_path: Path) -> Path:
     [
         ('grasp', ()),
         ('grasp', ('--max-needed-force', '3', '--stay-within', '-1,-1 1,-1 1,1 -1,1')),
-        ('orientation', ('--hold', 'left_joint', '--forbid', 'object.v2|palm.0.e2')),
-        ('orientation', ('--prefer', 'shortest', '--alternatives', '2', '--resolution', '0.1')),
+        ('orientation', ('--forbid', 'object.v2|palm.0.e2', '--resolution', '0.1')),
+        ('orientation', ('--prefer', 'shortest', '--alternatives', '2')),
     ],
     ids=['plain', 'bounds', 'constraints', 'alternatives'],
 )
