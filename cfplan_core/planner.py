@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.held import HeldSystem
 from cfplan_core.contact.system import ContactSystem
-from cfplan_core.errors import CfplanError
+from cfplan_core.errors import CfplanError, Finding
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Goal, Problem
@@ -24,8 +24,9 @@ from cfplan_core.planning.constraints import (
     contradictions,
 )
 from cfplan_core.planning.equations import formation_rows
+from cfplan_core.planning.goal_limits import why_impossible
 from cfplan_core.planning.goal_test import GoalTest
-from cfplan_core.planning.grasp_check import examine_problem
+from cfplan_core.planning.grasp_check import ExaminedProblem, examine_problem
 from cfplan_core.planning.manifold import settle
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
@@ -109,13 +110,13 @@ class _Planning:
         try:
             constraints = compile_constraints(self.system, self.model, self.options)
         except CfplanError as error:
-            return self._answer(Status.INVALID, f'options: {error}')
+            return self._invalid(f'options: {error}', 'options')
         findings = examined.findings or contradictions(
             constraints, self.system, examined, self.problem.goal, self.options.held_joints
         )
         if findings:
             message = '\n'.join(str(finding) for finding in findings)
-            return self._answer(Status.INVALID, message)
+            return replace(self._answer(Status.INVALID, message), findings=tuple(findings))
         start = examined.start.z
         if self.options.held_joints:
             self.moving = HeldSystem(self.system, self.options.held_joints, start)
@@ -123,31 +124,56 @@ class _Planning:
         # Alternatives are told apart along rays.
         resolution = self.options.resolution if self.options.alternatives == 1 else None
         self.roadmap = Roadmap(self.moving, self.model, self._checkpoint, constraints, resolution)
-        goal: FloatArray | GoalTest
         try:
-            if examined.goal is not None:
-                goal = self.moving.reduced(examined.goal.z)
-                if self.options.held_joints:
-                    goal = settle(self.moving, goal, formation_rows(examined.goal.pairs))
-            else:
-                goal = GoalTest(self.moving, self._free_goal())
+            goals = self._goals(examined)
         except CfplanError as error:
-            return self._answer(Status.INVALID, f'goal: {error}')
+            return self._invalid(f'goal: {error}', 'goal')
+        impossible = '' if examined.goal is not None else why_impossible(self.problem, self._goal)
+        if impossible:
+            return self._answer(Status.INFEASIBLE, f'no path: {impossible}')
         try:
             if self.options.optimal:
                 exact = self.options.alternatives == 1 and self.moving.joint_count <= MOST_JOINTS
                 search = self._search_all if exact else self._search_best
-                best = search(start, goal)
+                # Best is what is best of all that the goal allows.
+                best = search(start, goals[-1])
                 if best is not None:
                     return best
                 legs = None
             else:
-                legs = self._search(start, goal)
+                found = (self._search(start, goal) for goal in goals)
+                legs = next((legs for legs in found if legs is not None), None)
         except _BudgetExhaustedError as stop:
             return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
         if legs is None:
-            return self._answer(Status.INFEASIBLE, f'no path; {self._explored()}{self._doubt()}')
+            nearest = goals[-1].how_near() if isinstance(goals[-1], GoalTest) else ''
+            message = f'no path{nearest}; {self._explored()}{self._doubt()}'
+            return self._answer(Status.INFEASIBLE, message)
         return self._solved(legs, '')
+
+    def _goals(self, examined: ExaminedProblem) -> list[FloatArray | GoalTest]:
+        """The goal grasp, if it is one, and all that its tolerance allows, if that is more."""
+        goals: list[FloatArray | GoalTest] = []
+        if examined.goal is not None:
+            z = self.moving.reduced(examined.goal.z)
+            if self.options.held_joints:
+                z = settle(self.moving, z, formation_rows(examined.goal.pairs))
+            goals.append(z)
+        if examined.goal is None or self._goal.tolerance.wide:
+            goals.append(GoalTest(self.moving, self._goal))
+        return goals
+
+    def _invalid(self, message: str, part: str) -> PlanResult:
+        """The answer where a part, ``options`` or ``goal``, names what the problem lacks.
+
+        An error of the options begins with the option's name.
+        """
+        text = message.removeprefix(f'{part}: ')
+        name, _, rest = text.partition(': ')
+        finding = Finding('<problem>', part, text, '')
+        if part == 'options' and name.isidentifier():
+            finding = Finding('<problem>', f'{part}.{name}', rest, '')
+        return replace(self._answer(Status.INVALID, message), findings=(finding,))
 
     def _solved(self, legs: Sequence[Leg], message: str) -> PlanResult:
         """The answer for a path, with the trees of the search that found it."""
@@ -165,7 +191,8 @@ class _Planning:
             entry_upper=frames.entry_upper,
         )
 
-    def _free_goal(self) -> Goal:
+    @property
+    def _goal(self) -> Goal:
         """The goal without the angles of held joints, which agree with the start's."""
         goal, held = self.problem.goal, self.options.held_joints
         if not held or goal.joints is None:
