@@ -8,7 +8,6 @@ from typing import Any, TypeVar
 
 import click
 
-
 PREFERENCES = ('first', 'fewest-segments', 'shortest', 'robust')
 
 Command = TypeVar('Command', bound=Callable[..., Any])
