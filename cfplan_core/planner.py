@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.held import HeldSystem
 from cfplan_core.contact.system import ContactSystem
-from cfplan_core.errors import CfplanError
+from cfplan_core.errors import CfplanError, Finding
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Goal, Problem
@@ -18,14 +18,16 @@ from cfplan_core.options import PlanOptions as PlanOptions
 from cfplan_core.options import Preference
 from cfplan_core.options import TrajectoryOptions as TrajectoryOptions
 from cfplan_core.planning.best_first import BestFirst
+from cfplan_core.planning.best_on_mesh import Best, BestOnMesh
 from cfplan_core.planning.constraints import (
     REASONS,
     compile_constraints,
     contradictions,
 )
 from cfplan_core.planning.equations import formation_rows
+from cfplan_core.planning.goal_limits import why_impossible
 from cfplan_core.planning.goal_test import GoalTest
-from cfplan_core.planning.grasp_check import examine_problem
+from cfplan_core.planning.grasp_check import ExaminedProblem, examine_problem
 from cfplan_core.planning.manifold import settle
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
@@ -52,6 +54,8 @@ class Progress:
     message: str
 
 
+# Hands that everything is explored for.
+MOST_JOINTS = 2
 TOO_WEAK = 'a joint would exceed its effort limit'
 
 
@@ -107,44 +111,70 @@ class _Planning:
         try:
             constraints = compile_constraints(self.system, self.model, self.options)
         except CfplanError as error:
-            return self._answer(Status.INVALID, f'options: {error}')
+            return self._invalid(f'options: {error}', 'options')
         findings = examined.findings or contradictions(
             constraints, self.system, examined, self.problem.goal, self.options.held_joints
         )
         if findings:
             message = '\n'.join(str(finding) for finding in findings)
-            return self._answer(Status.INVALID, message)
+            return replace(self._answer(Status.INVALID, message), findings=tuple(findings))
         start = examined.start.z
         if self.options.held_joints:
             self.moving = HeldSystem(self.system, self.options.held_joints, start)
             start = self.moving.reduced(start)
-        # Sheets know of no constraint, and the search for the best plan moves straight.
-        plain = constraints.none and self.moving is self.system
-        resolution = self.options.resolution if plain and not self.options.optimal else None
+        # Alternatives are told apart along rays.
+        resolution = self.options.resolution if self.options.alternatives == 1 else None
         self.roadmap = Roadmap(self.moving, self.model, self._checkpoint, constraints, resolution)
-        goal: FloatArray | GoalTest
         try:
-            if examined.goal is not None:
-                goal = self.moving.reduced(examined.goal.z)
-                if self.options.held_joints:
-                    goal = settle(self.moving, goal, formation_rows(examined.goal.pairs))
-            else:
-                goal = GoalTest(self.moving, self._free_goal())
+            goals = self._goals(examined)
         except CfplanError as error:
-            return self._answer(Status.INVALID, f'goal: {error}')
+            return self._invalid(f'goal: {error}', 'goal')
+        impossible = '' if examined.goal is not None else why_impossible(self.problem, self._goal)
+        if impossible:
+            return self._answer(Status.INFEASIBLE, f'no path: {impossible}')
         try:
             if self.options.optimal:
-                best = self._search_best(start, goal)
+                exact = self.options.alternatives == 1 and self.moving.joint_count <= MOST_JOINTS
+                search = self._search_all if exact else self._search_best
+                # Best is what is best of all that the goal allows.
+                best = search(start, goals[-1])
                 if best is not None:
                     return best
                 legs = None
             else:
-                legs = self._search(start, goal)
+                found = (self._search(start, goal) for goal in goals)
+                legs = next((legs for legs in found if legs is not None), None)
         except _BudgetExhaustedError as stop:
             return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
         if legs is None:
-            return self._answer(Status.INFEASIBLE, f'no path; {self._explored()}{self._doubt()}')
+            nearest = goals[-1].how_near() if isinstance(goals[-1], GoalTest) else ''
+            message = f'no path{nearest}; {self._explored()}{self._doubt()}'
+            return self._answer(Status.INFEASIBLE, message)
         return self._solved(legs, '')
+
+    def _goals(self, examined: ExaminedProblem) -> list[FloatArray | GoalTest]:
+        """The goal grasp, if it is one, and all that its tolerance allows, if that is more."""
+        goals: list[FloatArray | GoalTest] = []
+        if examined.goal is not None:
+            z = self.moving.reduced(examined.goal.z)
+            if self.options.held_joints:
+                z = settle(self.moving, z, formation_rows(examined.goal.pairs))
+            goals.append(z)
+        if examined.goal is None or self._goal.tolerance.wide:
+            goals.append(GoalTest(self.moving, self._goal))
+        return goals
+
+    def _invalid(self, message: str, part: str) -> PlanResult:
+        """The answer where a part, ``options`` or ``goal``, names what the problem lacks.
+
+        An error of the options begins with the option's name.
+        """
+        text = message.removeprefix(f'{part}: ')
+        name, _, rest = text.partition(': ')
+        finding = Finding('<problem>', part, text, '')
+        if part == 'options' and name.isidentifier():
+            finding = Finding('<problem>', f'{part}.{name}', rest, '')
+        return replace(self._answer(Status.INVALID, message), findings=(finding,))
 
     def _solved(self, legs: Sequence[Leg], message: str) -> PlanResult:
         """The answer for a path, with the trees of the search that found it."""
@@ -164,7 +194,8 @@ class _Planning:
             entry_nominal=frames.entry_nominal,
         )
 
-    def _free_goal(self) -> Goal:
+    @property
+    def _goal(self) -> Goal:
         """The goal without the angles of held joints, which agree with the start's."""
         goal, held = self.problem.goal, self.options.held_joints
         if not held or goal.joints is None:
@@ -187,6 +218,11 @@ class _Planning:
         def rate(formation: Formation, z: FloatArray) -> float:
             return robustness.ratios(formation, self.moving.expanded(z)).worst
 
+        def margin_of(legs: Sequence[Leg]) -> float:
+            return robustness.margin(
+                [(leg.formation, self.moving.expanded(leg.points)) for leg in legs]
+            )
+
         def settled(states: int) -> None:
             self._grown(states, 1)
 
@@ -207,13 +243,56 @@ class _Planning:
         for label in best.chosen:
             best.conclude(label)
             legs, _ = label.path()
-            results.append(replace(self._solved(legs, message), margin=best.margin(legs)))
+            results.append(replace(self._solved(legs, message), margin=margin_of(legs)))
         if not results and first is not None:
             self.search = first_search
-            results = [replace(self._solved(first, message), margin=best.margin(first))]
+            results = [replace(self._solved(first, message), margin=margin_of(first))]
         if not results and stopped:
             raise _BudgetExhaustedError(stopped)
         return replace(results[0], alternatives=tuple(results[1:])) if results else None
+
+    def _search_all(self, start: FloatArray, goal: FloatArray | GoalTest) -> PlanResult | None:
+        """Search everything that can be reached for the best plan; None if there is none."""
+        prefer, stopped, best = self.options.prefer, '', None
+        robustness = Robustness(self.system, self.model)
+        first = None
+        if not self.options.required:
+            first = self._search(start, goal)
+            if first is None:
+                return None
+        try:
+            mesh = BestOnMesh(
+                self.roadmap, start, goal, robustness, self.moving.expanded, self._met
+            )
+            best = mesh.choose(prefer, first, self._refuse)
+            if best is None:
+                return None
+        except _BudgetExhaustedError as stop:
+            if first is None:
+                raise
+            stopped = str(stop)
+        legs = first if best is None else best.legs
+        assert legs is not None
+        whole = [(leg.formation, self.moving.expanded(leg.points)) for leg in legs]
+        margin = robustness.margin(whole)
+        message = self._verdict_of_all(stopped, margin, best)
+        return replace(self._solved(legs, message), margin=margin)
+
+    def _met(self, pieces: int) -> None:
+        self._grown(pieces, 1)
+
+    def _verdict_of_all(self, stopped: str, margin: float, best: Best | None) -> str:
+        """Say whether a plan is the best of all that can be reached, and at what resolution."""
+        prefer = self.options.prefer
+        name = Preference.FEWEST_SEGMENTS if prefer is Preference.FIRST else prefer
+        if stopped:
+            return f'{name.value}: the best found so far; {stopped}'
+        bound = ''
+        if best is not None and best.bound is not None:
+            bound = (
+                f', whose margin is {margin:.3f} where {best.bound:.3f} is the most there can be'
+            )
+        return f'{name.value}: none better exists{bound}; {self.roadmap.regions.coverage()}'
 
     def _refuse(self, legs: Sequence[Leg]) -> list[int]:
         """Which legs cannot be held, with the reasons noted."""

@@ -22,8 +22,9 @@ from cfplan_core.command_line.console import (
     print_findings,
 )
 from cfplan_core.command_line.inputs import Examined, examine
-from cfplan_core.command_line.plan_options import timed_plan, trajectory_options, wanted_plan
+from cfplan_core.command_line.plan_options import wanted_plan
 from cfplan_core.command_line.progress import progress_bar
+from cfplan_core.command_line.trajectory_options import timed_plan, trajectory_options
 from cfplan_core.errors import CfplanError, InvalidProblemError
 from cfplan_core.model import Problem
 from cfplan_core.trajectory.plan_result import PlanResult, Status
@@ -125,10 +126,6 @@ def plan(
     # Files first: they must be there even if the reader of the tables leaves early.
     if json_path is not None:
         write_result(result, json_path)
-        for number, other in enumerate(result.alternatives, 2):
-            write_result(
-                other, json_path.with_name(f'{json_path.stem}.{number}{json_path.suffix}')
-            )
     figures: list[Path] = []
     if figure_directory is not None and result.status is not Status.INVALID:
         from cfplan_core.report.figures import write_figures
@@ -198,10 +195,12 @@ def _invalid(examined: Examined, file: Path, error: InvalidProblemError) -> Plan
 
 
 def write_result(result: PlanResult, path: Path) -> None:
-    """Write a result of any status as JSON."""
+    """Write a result of any status as JSON, and its alternatives beside it."""
     from cfplan_core.trajectory.plan_file import write_plan
 
     write_plan(result, path)
+    for number, other in enumerate(result.alternatives, 2):
+        write_plan(other, path.with_name(f'{path.stem}.{number}{path.suffix}'))
 
 
 def print_result(problem: Problem, result: PlanResult, figures: list[Path]) -> None:

@@ -1,17 +1,12 @@
-"""Options of ``cfplan plan`` that say which plan is wanted."""
+"""Options of ``cfplan plan`` and ``cfplan call`` that say which plan is wanted."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
-
-from cfplan_core.command_line.explore import second_order_option
-
-if TYPE_CHECKING:
-    from cfplan_core.options import TrajectoryOptions
 
 PREFERENCES = ('first', 'fewest-segments', 'shortest', 'robust')
 
@@ -52,56 +47,26 @@ def corners(
     return tuple(read)
 
 
-TRAJECTORY = ('squeeze', 'inertia', 'event_speed', 'event_distance')
-"""Options that say how the path becomes a trajectory."""
+def second_order_option(command: click.decorators.FC) -> click.decorators.FC:
+    """Option for grasps that are stable to second order."""
+    return click.option(
+        '--second-order/--no-second-order',
+        default=True,
+        show_default=True,
+        help='Whether two contacts may hold the object at a strict minimum of its energy.',
+    )(command)
 
 
-def timed_plan(command: Command) -> Command:
-    """Add the options of `TRAJECTORY` to a command."""
-    options = [
-        click.option(
-            '--squeeze',
-            type=float,
-            callback=weights,
-            metavar='F',
-            help='Nominal torques press with at most F weights where that is a choice; 5 unless '
-            'given.',
-        ),
-        click.option(
-            '--inertia',
-            type=float,
-            metavar='SHARE',
-            help='Inertial forces are at most this share of the weight; 0.05 unless given.',
-        ),
-        click.option(
-            '--event-speed',
-            type=float,
-            metavar='SHARE',
-            help='Near contact events joints use at most this share of their velocity limits; '
-            '0.25 unless given.',
-        ),
-        click.option(
-            '--event-distance',
-            type=float,
-            metavar='RAD',
-            help='How near that is along the path of the joints; 0.05 rad unless given.',
-        ),
-    ]
-    for option in reversed(options):
-        command = option(command)
-    return command
-
-
-def trajectory_options(wanted: dict[str, Any]) -> TrajectoryOptions:
-    """Take the options of `TRAJECTORY` out of all that were given.
-
-    Raises:
-        CfplanError: A value is not possible.
-    """
-    from cfplan_core.options import TrajectoryOptions
-
-    given = {name: wanted.pop(name) for name in TRAJECTORY}
-    return TrajectoryOptions(**{name: value for name, value in given.items() if value is not None})
+def resolution_option(command: click.decorators.FC) -> click.decorators.FC:
+    """Option for the spacing of the grid of joint angles."""
+    return click.option(
+        '--resolution',
+        type=click.FloatRange(0.001, 1.0),
+        default=0.05,
+        show_default=True,
+        metavar='RAD',
+        help='Spacing of the grid of joint angles that regions are explored over.',
+    )(command)
 
 
 def wanted_plan(command: Command) -> Command:
@@ -165,6 +130,6 @@ def wanted_plan(command: Command) -> Command:
         ),
         second_order_option,
     ]
-    for option in reversed(options):
+    for option in reversed([*options, resolution_option]):
         command = option(command)
     return command

@@ -7,6 +7,7 @@ configurations, whose first three columns are the wrench directions wᵀ and who
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple, Protocol
 
@@ -56,6 +57,20 @@ class Motion(NamedTuple):
     object_velocity: FloatArray
     gap_rates: FloatArray
     unique: bool
+
+
+class Holding(NamedTuple):
+    """A stretch of motion inside one contact formation, to be held by actuators.
+
+    Attributes:
+        gradients: Shape (s, k, 3 + n).
+        lower: Shape (s, n), smallest torques that are possible, without the links' weight.
+        upper: Shape (s, n), largest ones.
+    """
+
+    gradients: FloatArray
+    lower: FloatArray
+    upper: FloatArray
 
 
 class Actuation(NamedTuple):
@@ -109,13 +124,10 @@ class ContactModel(Protocol):
         Unlike `torque_limits` this asks for all joints at once.
         """
 
-    def actuation(
-        self, gradients: FloatArray, lower: FloatArray, upper: FloatArray, squeeze: float
-    ) -> Actuation:
-        """Say how actuators should hold a stretch of motion inside one contact formation.
+    def actuation(self, stretches: Sequence[Holding], squeeze: float) -> tuple[Actuation, ...]:
+        """Say how actuators should hold stretches of motion, each inside one contact formation.
 
-        With torques inside limits of shape (s, n), without the links' weight, and contact forces
-        of at most `squeeze` weights where the contacts leave a choice.
+        With contact forces of at most `squeeze` weights where the contacts leave a choice.
         """
 
     def needed_forces(self, gradients: FloatArray) -> FloatArray:

@@ -65,13 +65,16 @@ def control_roles(wrenches: FloatArray, arms: FloatArray, forces: FloatArray) ->
     rank = int((values > _RANK * values[:, :1]).sum(axis=1).max(initial=0))
     null = right[:, rank:]
     rates = null @ a
-    left, controlled, _ = np.linalg.svd(rates)
-    free = int((controlled > _SINGULAR).sum(axis=1).max(initial=0))
+    if null.shape[1] > 1:
+        # What of the null space the torques tell.
+        left, controlled, _ = np.linalg.svd(rates)
+        free = int((controlled > _SINGULAR).sum(axis=1).max(initial=0))
+        told = left[:, :, :free].transpose(0, 2, 1)
+        null, rates = told @ null, told @ rates
+    else:
+        free = int(np.abs(rates).max(initial=0.0) > _SINGULAR)
     if free == 0:
         return (Roles((), np.inf),)
-    # What of the null space the torques tell.
-    told = left[:, :, :free].transpose(0, 2, 1)
-    null, rates = told @ null, told @ rates
     strengths = np.linalg.norm(rates, axis=1).max(axis=0)
     order = np.argsort(-strengths, kind='stable')[:_MOST_JOINTS]
     able = sorted(int(joint) for joint in order if strengths[joint] > _SINGULAR)
@@ -89,8 +92,10 @@ def _margin(null: FloatArray, rates: FloatArray, forces: FloatArray) -> float:
         rates: Shape (s, e, e), rows are the torques of these.
         forces: Shape (s, k).
     """
-    if (np.linalg.svd(rates, compute_uv=False)[:, -1] <= _SINGULAR).any():
+    single = rates.shape[1] == 1
+    least = np.abs(rates[:, 0]) if single else np.linalg.svd(rates, compute_uv=False)
+    if (least[:, -1] <= _SINGULAR).any():
         return 0.0
-    change = np.abs(np.linalg.solve(rates, null)).sum(axis=1)
+    change = np.abs(null / rates if single else np.linalg.solve(rates, null)).sum(axis=1)
     ratios = np.divide(forces, change, where=change > _SINGULAR, out=np.full(forces.shape, np.inf))
     return float(ratios.min())

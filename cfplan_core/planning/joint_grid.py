@@ -50,6 +50,10 @@ class JointGrid:
         """Distance of neighbouring lines of a level in lines of the finest."""
         return int(2 ** (self.levels - 1 - level))
 
+    def is_coarse(self, place: Place) -> bool:
+        """Tell whether a node is one of level 0."""
+        return not any(line % self.stride(0) for line in place)
+
     def joints(self, place: Place) -> FloatArray:
         """Joint angles of a node, shape (n,)."""
         return np.array([axis[k] for axis, k in zip(self.axes, place, strict=True)])

@@ -105,8 +105,9 @@ class Region(Piece):
 
     def path(self, start: FloatArray, end: FloatArray) -> FloatArray:
         """Points from one linked configuration over the anchor to another."""
-        back, out = self._link(start), self._link(end)
+        back, out = self.link(start), self.link(end)
         return np.concatenate([back[::-1], out[1:]])
 
-    def _link(self, z: FloatArray) -> FloatArray:
+    def link(self, z: FloatArray) -> FloatArray:
+        """Points that lead to a linked configuration, shape (s, 3 + n)."""
         return min(self.links, key=lambda link: float(np.abs(link[0] - z).max()))[1]

@@ -1,27 +1,26 @@
-"""How far a configuration is from what would spoil a plan there, as one number.
+"""How far a motion is from what would spoil it, as one number.
 
 The margin is the smallest of five ratios; 1 is comfortable, 0 is the border of what works:
 
 - force: 1 / F, where F is the needed force in weights of the object;
 - hold: the stability margin, the distance of W's columns and f from no longer spanning R³, / 0.2;
   for two contacts that of second order, the smallest of the energy's curvature, the two forces
-  and the sine between the wrenches. Where a stretch begins or ends as other contacts stop pressing
-  and the object settles onto two of them, these two count if that is more, less the load that
-  they leave to the others;
-- clearance: the smallest distance between features of bodies that do not touch, in object sizes,
-  / 0.1. Features that touch where the stretch begins do not count until they are as far apart as
-  they get before they come nearer again, nor do, likewise backwards, those at its end: the plan
-  breaks or makes these contacts;
+  and the sine between the wrenches. Where other contacts stop pressing and the object settles onto
+  two of them, these two count if that is more, less the load that they leave to the others;
+- clearance: the smallest distance of a near miss, in object sizes, / 0.1. A near miss is a vertex
+  and an edge that come nearer than 0.1 and part again without having touched in between;
 - torque: k contacts of rank 3 leave k − 3 joints to be controlled by their torque (Trinkle &
   Hunter, Section 3): the width of the (k − 3)rd widest interval of torques that keep the contacts,
   within the effort limits, in weights times sizes, / 0.2. Three contacts need none;
 - limits: the distance of the joints from their limits, in rad, / 0.1.
 
-`docs/optimality.md` says why.
+All but the clearance are properties of a configuration: no plan has a larger margin than its start
+and its goal. `docs/optimality.md` says why these.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -29,23 +28,21 @@ import numpy as np
 
 from cfplan_core.contact.curvature import wrench_rates
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.gaps import gap_gradients, gaps
-from cfplan_core.contact.system import ComplexArray, ContactSystem, Placement
+from cfplan_core.contact.gaps import gap_gradients
+from cfplan_core.contact.system import ContactSystem, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel
 from cfplan_core.mechanics.second_order import pair_forces, unbalanced_margin
 from cfplan_core.planning.equations import is_second_order
+from cfplan_core.planning.near_misses import near_misses
 from cfplan_core.planning.tracing import stability_margins
-from cfplan_core.planning.transitions import TOUCH
 
 _COMFORTABLE_HOLD = 0.2
-# Load, in weights, that two contacts leave to others which only just touch.
-_SETTLED = 1e-6
-_COMFORTABLE_CLEARANCE = 0.1
+COMFORTABLE_CLEARANCE = 0.1
 _COMFORTABLE_TORQUE = 0.2
 _COMFORTABLE_LIMIT = 0.1
-# Farther apart than this, in object sizes, nothing matters.
-_FAR = 10.0
+# Step, in radians and object sizes, at which margins are looked at.
+_FINE = 0.01
 
 
 class Ratios(NamedTuple):
@@ -53,9 +50,9 @@ class Ratios(NamedTuple):
 
     force: FloatArray
     hold: FloatArray
-    clearance: FloatArray
     torque: FloatArray
     limits: FloatArray
+    clearance: FloatArray
 
     @property
     def worst(self) -> float:
@@ -64,11 +61,15 @@ class Ratios(NamedTuple):
 
 
 class Robustness:
-    """The margin of configurations of one system under one contact model."""
+    """The margin of configurations of one system under one contact model.
+
+    Attributes:
+        system: With all joints.
+    """
 
     def __init__(self, system: ContactSystem, model: ContactModel) -> None:
         """Prepare; the system has all joints."""
-        self._system = system
+        self.system = system
         self._model = model
         effort = np.array([joint.effort_limit for joint in system.problem.hand.joints])
         self._effort = effort / (system.force_unit * system.size)
@@ -78,35 +79,58 @@ class Robustness:
 
         Args:
             formation: The contacts that are kept.
-            z: Shape (s, 3 + n), in order; at the first and the last others may touch as well.
+            z: Shape (s, 3 + n), in order.
         """
-        system = self._system
+        return Ratios(*self._steady(formation, z), clearance=self._clearance([z]))
+
+    def steady(self, formation: Formation, z: FloatArray) -> FloatArray:
+        """Smallest ratio at each configuration without the clearance, which is of a motion.
+
+        Args:
+            formation: The contacts that are kept.
+            z: Shape (s, 3 + n), in any order.
+        """
+        return np.asarray(np.minimum.reduce(self._steady(formation, z)))
+
+    def margin(self, legs: Sequence[tuple[Formation, FloatArray]]) -> float:
+        """Margin of motions one after the other, each a formation and points, (s, 3 + n).
+
+        No more than the smallest of theirs: a near miss may take more than one.
+        """
+        steady = min(float(self.steady(formation, finer(z)).min()) for formation, z in legs)
+        return min(steady, float(self._clearance([z for _, z in legs]).min()))
+
+    def _steady(
+        self, formation: Formation, z: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Ratios of force, hold, torque and limits, each of shape (s,)."""
+        system = self.system
         placed = system.place(z)
         gradients = gap_gradients(system, placed, formation.array)
-        needed = self._model.needed_forces(gradients)
         joints = z[:, 3:]
-        return Ratios(
-            force=1.0 / np.maximum(needed, 1e-9),
-            hold=np.maximum(self._hold(formation, z, placed, gradients), 0.0) / _COMFORTABLE_HOLD,
-            clearance=self._clearance(formation, placed) / _COMFORTABLE_CLEARANCE,
-            torque=self._torque(gradients, z) / _COMFORTABLE_TORQUE,
-            limits=np.minimum(joints - system.lower, system.upper - joints).min(axis=1)
-            / _COMFORTABLE_LIMIT,
+        room = np.minimum(joints - system.lower, system.upper - joints).min(axis=1)
+        return (
+            1.0 / np.maximum(self._model.needed_forces(gradients), 1e-9),
+            np.maximum(self._hold(formation, z, placed, gradients), 0.0) / _COMFORTABLE_HOLD,
+            self._torque(gradients, z) / _COMFORTABLE_TORQUE,
+            room / _COMFORTABLE_LIMIT,
         )
+
+    def _clearance(self, parts: Sequence[FloatArray]) -> FloatArray:
+        """Ratio of the near misses on a path, at its points; shape (s,)."""
+        z = np.concatenate(parts)
+        return near_misses(self.system, z, COMFORTABLE_CLEARANCE) / COMFORTABLE_CLEARANCE
 
     def _hold(
         self, formation: Formation, z: FloatArray, placed: Placement, gradients: FloatArray
     ) -> FloatArray:
-        """Stability margin, of two contacts where the others let go at an end of the stretch."""
-        system, model, pairs = self._system, self._model, formation.array
+        """Stability margin, of two contacts where that is more; shape (s,)."""
+        system, model, pairs = self.system, self._model, formation.array
         hold = stability_margins(system, model, z, gradients, pairs).stable
         if not model.second_order or is_second_order(pairs):
             return hold
         for chosen in combinations(range(len(pairs)), 2):
             two = list(chosen)
-            _, ends = pair_forces(gradients[[0, -1]][:, two, :3], system.load)
-            if not (ends < _SETTLED).any():
-                continue
             rates = wrench_rates(system, placed, pairs[two])
             wrenches = gradients[:, two, :3]
             _, rest = pair_forces(wrenches, system.load)
@@ -114,38 +138,13 @@ class Robustness:
             hold = np.maximum(hold, settled)
         return hold
 
-    def _clearance(self, formation: Formation, placed: Placement) -> FloatArray:
-        """Smallest distance of a vertex from an edge that it neither touches nor is to touch.
-
-        Distances are least where a vertex passes the end of an edge, between samples mostly: they
-        are those of the straight path from each sample to the next, in the edge's frame.
-        """
-        system = self._system
-        gap, offset = gaps(system, placed, slice(None))
-        length = system.pair_length
-        distance = np.hypot(gap, np.maximum(np.maximum(-offset, offset - length), 0.0))
-        left_out = np.zeros(distance.shape, dtype=bool)
-        left_out[:, formation.array] = True
-        for along, out in ((distance, left_out), (distance[::-1], left_out[::-1])):
-            pairs = np.flatnonzero(along[0] < TOUCH)
-            apart = along[:, pairs]
-            opening = apart >= np.maximum.accumulate(apart, axis=0)
-            out[:, pairs] |= np.logical_and.accumulate(opening, axis=0)
-        nearest = np.where(left_out, _FAR, distance).min(axis=1)
-        if len(gap) > 1:
-            place = offset + 1j * gap
-            between = np.minimum(_passing(place), _passing(place - length))
-            between = np.where(left_out[1:] & left_out[:-1], _FAR, between).min(axis=1)
-            nearest[1:] = np.minimum(nearest[1:], between)
-        return np.asarray(nearest)
-
     def _torque(self, gradients: FloatArray, z: FloatArray) -> FloatArray:
         """Width of the narrowest interval of torques that has to be held."""
         spare = gradients.shape[1] - 3
         joints = gradients.shape[2] - 3
         if spare < 1 or joints == 0:
             return np.full(len(z), np.inf)
-        weight = self._system.link_weight_torques(z)
+        weight = self.system.link_weight_torques(z)
         lower, upper = self._model.torque_limits(gradients)
         lower = np.maximum(lower + weight, -self._effort)
         upper = np.minimum(upper + weight, self._effort)
@@ -153,12 +152,16 @@ class Robustness:
         return np.asarray(widths[:, -min(spare, joints)])
 
 
-def _passing(place: ComplexArray) -> FloatArray:
-    """Distances of straight paths between successive points from zero; shape (s - 1, m).
+def finer(z: FloatArray) -> FloatArray:
+    """Points with more between them, on straight lines: margins have sharp minima.
 
     Args:
-        place: Shape (s, m).
+        z: Shape (s, 3 + n), successive points.
     """
-    step = np.diff(place, axis=0)
-    along = -(place[:-1] * step.conj()).real / np.maximum(np.abs(step) ** 2, 1e-30)
-    return np.asarray(np.abs(place[:-1] + np.clip(along, 0.0, 1.0) * step))
+    steps = np.diff(z, axis=0)
+    parts = np.ceil(np.abs(steps).max(axis=1) / _FINE).astype(int) if len(z) > 1 else []
+    inner = [
+        begin + np.arange(count)[:, None] / max(count, 1) * step
+        for begin, step, count in zip(z, steps, parts, strict=False)
+    ]
+    return np.concatenate([*inner, z[-1:]])

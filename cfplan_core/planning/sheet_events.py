@@ -13,7 +13,7 @@ from enum import IntEnum
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.gaps import gaps
+from cfplan_core.contact.gaps import gap_gradients, gaps
 from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.equations import equations
@@ -144,7 +144,8 @@ def locate_first(
     near[:, formation.array] = False
     start_gap = gaps(system, system.place(before), slice(None)).gap
     clean = np.asarray(~(near & (start_gap > _NEAR)).any(axis=1))
-    margins = tracer.stability(formation, z, placed)
+    gradients = gap_gradients(system, placed, formation.array)
+    margins = tracer.judge(z, gradients, formation.array)
     holds = margins.stable > STABILITY_MARGIN
     links = is_gap & (happenings.pair >= system.contact_count)
     for k in first[real[first] & clean[first]]:

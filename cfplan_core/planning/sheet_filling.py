@@ -177,7 +177,8 @@ class _Filling:
             if way.arrived:
                 self._arrive(step, way.points[-1], way.points[1:-1])
             elif way.leads_on:
-                self.sheet.borders.append(Border(step[0], way.points, way.changes_class))
+                border = Border(step[0], way.points, step[3], way.changes_class)
+                self.sheet.borders.append(border)
             else:
                 self.sheet.losses.append((step[0], angles))
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.joint_grid import Place
-from cfplan_core.planning.pieces import SAME, Region
+from cfplan_core.planning.pieces import SAME, Piece, Region
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +25,13 @@ class Border:
     Attributes:
         vertex: Index of the vertex.
         points: Shape (s, 3 + n), from the vertex to the border.
+        beyond: Node of the grid that the step led to.
         changes_class: True where only the stability class changes.
     """
 
     vertex: int
     points: FloatArray
+    beyond: Place
     changes_class: bool = False
 
     @property
@@ -70,6 +72,10 @@ class Sheet(Region):
         self._index_of[z.tobytes()] = len(self.vertices) - 1
         return len(self.vertices) - 1
 
+    def index_of(self, z: FloatArray) -> int:
+        """Index of the vertex at a configuration, shape (3 + n,)."""
+        return self._index_of[z.tobytes()]
+
     def connect(self, first: int, second: int, between: FloatArray) -> None:
         """Add an edge; the configurations between lead from the first vertex to the second."""
         self.edges[first][second] = between
@@ -82,13 +88,14 @@ class Sheet(Region):
         """
         if np.abs(start - end).max() < SAME:
             return start[None]
-        back, out = self._link(start), self._link(end)
+        back, out = self.link(start), self.link(end)
         first, last = (self._index_of[link[0].tobytes()] for link in (back, out))
         along = self._shortened(self._route(first, last))
         return np.concatenate([back[::-1], along[1:], out[1:]])
 
-    def _link(self, z: FloatArray) -> FloatArray:
-        return z[None] if z.tobytes() in self._index_of else super()._link(z)
+    def link(self, z: FloatArray) -> FloatArray:
+        """Points that lead from a vertex to a linked configuration, shape (s, 3 + n)."""
+        return z[None] if z.tobytes() in self._index_of else super().link(z)
 
     def _route(self, first: int, last: int) -> list[int]:
         """Vertices of a shortest path over the grid."""
@@ -125,3 +132,8 @@ class Sheet(Region):
                 ahead = at + (ahead - at) // 2
             at = ahead
         return np.concatenate(parts)
+
+
+def configurations(piece: Piece) -> FloatArray:
+    """Configurations of a piece that were looked at, shape (s, 3 + n)."""
+    return np.array(piece.vertices) if isinstance(piece, Sheet) else piece.points

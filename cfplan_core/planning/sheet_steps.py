@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.gaps import gaps, wedge_lifts
+from cfplan_core.contact.gaps import gap_gradients, gaps, wedge_lifts
 from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.equations import equation_gradients
@@ -81,8 +81,10 @@ def take_steps(
     count = len(starts)
     middles, ends, smooth = _continued(tracer, rows, starts, joints)
     path = np.stack([starts, middles, ends], axis=1)
-    placed = system.place(path.reshape(-1, system.dof))
-    margins = tracer.stability(formation, path.reshape(-1, system.dof), placed)
+    flat = path.reshape(-1, system.dof)
+    placed = system.place(flat)
+    gradients = gap_gradients(system, placed, formation.array)
+    margins = tracer.judge(flat, gradients, formation.array)
     stable = (margins.stable > STABILITY_MARGIN).reshape(count, 3)
     closed = (margins.form_closure > STABILITY_MARGIN).reshape(count, 3)
     signs = margins.signs.reshape(count, 3, margins.signs.shape[1])

@@ -15,21 +15,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.system import BoolArray, IntArray
+from cfplan_core.contact.system import BoolArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.options import RESOLUTION
-from cfplan_core.planning.equations import equation_gradients, formation_rows
+from cfplan_core.planning.equations import equation_gradients, formation_rows, is_second_order
 from cfplan_core.planning.events import EventKind
+from cfplan_core.planning.goal_region import GoalRegion
 from cfplan_core.planning.joint_grid import JointGrid, Place
 from cfplan_core.planning.manifold import formation_equations, independent_rows, project
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.regions import Regions, _heading
 from cfplan_core.planning.settling_steps import settling_steps
+from cfplan_core.planning.sheet_crossing import step_across
 from cfplan_core.planning.sheet_filling import Table, fill
+from cfplan_core.planning.sheet_goals import goals_on_sheet
 from cfplan_core.planning.sheet_graph import Border, Sheet
 from cfplan_core.planning.sheet_steps import take_steps
 from cfplan_core.planning.sheet_walks import towards, walk
-from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STEP, classify
 from cfplan_core.planning.transitions import Departure
 
@@ -76,38 +78,18 @@ class Sheets(Regions):
         """Return the sheet of a formation that a stable configuration lies on."""
         return self._join(formation, z, z[None])
 
-    def reach(self, region: Region, columns: IntArray, wanted: FloatArray) -> Iterator[FloatArray]:
-        """Drive some coordinates towards wanted values, shape (m,), on a sheet.
-
-        From every vertex that is nearer than those beside it.
-
-        Yields:
-            Configurations, shape (3 + n,), linked to the sheet, where these coordinates are as
-            near as the sheet lets them come.
-        """
+    def reach(
+        self, region: Region, goal: GoalRegion, near: FloatArray | None
+    ) -> Iterator[FloatArray]:
+        """Configurations on a sheet that have a goal's coordinates; see `Regions.reach`."""
         assert isinstance(region, Sheet)
-        tracer = self._roadmap.tracer
-
-        def steer(z: FloatArray, basis: FloatArray) -> FloatArray | None:
-            off = wanted - z[columns]
-            along = np.linalg.lstsq(basis[:, columns].T, off, rcond=1e-6)[0]
-            ahead = np.asarray(along @ basis)
-            return ahead if np.abs(ahead).max() > 1e-9 else None
-
-        off = np.abs(np.array(region.vertices)[:, columns] - wanted).max(axis=1)
-        nearest = [
-            vertex
-            for vertex in np.argsort(off, kind='stable')
-            if all(off[vertex] <= off[other] for other in region.edges[vertex])
-        ]
-        for vertex in nearest:
-            z = region.vertices[vertex]
-            trace = tracer.follow(region.formation, z, steer, longest=1.0)
-            if trace.kind is not EventKind.TARGET:
-                continue
-            if len(split_by_class(tracer, region.formation, trace.points)) == 1:
-                region.links.append((trace.end, trace.points))
-                yield trace.end
+        if region.places == [None]:
+            yield from super().reach(region, goal, near)
+            return
+        rows = self._table(region.formation, region.vertices[0]).rows
+        for points in goals_on_sheet(self._roadmap.tracer, region, rows, goal, near):
+            region.links.append((points[-1], points))
+            yield points[-1]
 
     def losses(self, region: Region) -> Iterator[FloatArray]:
         """Ways from a sheet's vertices to where two contacts come to hold the object alone.
@@ -179,7 +161,7 @@ class Sheets(Regions):
             if way.arrived:
                 return self._linked(table, corner, level, z, way.points[:0:-1], inward)
             if way.leads_on and len(way.points) > 1:
-                borders.append(Border(0, way.points, way.changes_class))
+                borders.append(Border(0, way.points, corner, way.changes_class))
         return self._sliver(table, z, inward, borders)
 
     def _linked(
@@ -261,16 +243,50 @@ class Sheets(Regions):
         if region.places == [None]:
             # A strip narrower than the grid may be long.
             yield from super()._shoot(region)
+        found: list[tuple[FloatArray, Piece]] = []
+        onwards: list[tuple[Border, Departure]] = []
         for border in region.borders:
             self._roadmap.attempts += 1
             z = border.z
             region.links.append((z, border.points))
             if not border.changes_class and self._joins(region, z):
-                yield z, self._roadmap.root(z)
+                found.append((z, self._roadmap.root(z)))
             elif np.abs(border.points - z).max() > SAME:
                 heading = _heading(border.points)
-                onwards = [Departure(region.formation, heading, frozenset())]
-                for way in onwards if border.changes_class else self._ways(region, z, heading):
-                    entered = self.enter(z, way)
-                    if entered is not None and entered is not region:
-                        yield z, entered
+                if border.changes_class:
+                    onwards.append((border, Departure(region.formation, heading, frozenset())))
+                else:
+                    onwards += [(border, way) for way in self._ways(region, z, heading)]
+        yield from found
+        yield from self._cross(region, onwards)
+
+    def _cross(
+        self, region: Sheet, onwards: list[tuple[Border, Departure]]
+    ) -> Iterator[tuple[FloatArray, Piece]]:
+        """Enter sheets over borders, to the nodes that the steps led to where that is possible."""
+        alike: dict[Formation, list[int]] = {}
+        for number, (_, way) in enumerate(onwards):
+            alike.setdefault(way.formation, []).append(number)
+        for formation, numbers in alike.items():
+            some = [onwards[number][0] for number in numbers]
+            table = self._table(formation, some[0].z)
+            starts = np.array([border.z for border in some])
+            joints = np.array([self.grid.joints(border.beyond) for border in some])
+            departing = [onwards[number][1].departing for number in numbers]
+            crossed: list[FloatArray | None]
+            tracer = self._roadmap.tracer
+            if is_second_order(formation):
+                crossed = [None] * len(numbers)
+            else:
+                crossed = step_across(tracer, formation, table.rows, starts, joints, departing)
+            for number, points in zip(numbers, crossed, strict=True):
+                border, way = onwards[number]
+                place = border.beyond
+                entered: Region | None
+                known = points is not None and table.find(place, points[-1]) is not None
+                if points is not None and (known or self.grid.is_coarse(place)):
+                    entered = self._linked(table, place, 0, border.z, points[:1:-1], points[:2])
+                else:
+                    entered = self.enter(border.z, way)
+                if entered is not None and entered is not region:
+                    yield border.z, entered

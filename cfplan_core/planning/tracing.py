@@ -143,12 +143,6 @@ class Tracer:
             )
         return margins
 
-    def stability(self, formation: Formation, z: FloatArray, placed: Placement) -> Margins:
-        """Stability margins alone, whatever the bounds, with the features placed at z."""
-        pairs = formation.array
-        gradients = gap_gradients(self.system, placed, pairs)
-        return stability_margins(self.system, self.model, z, gradients, pairs)
-
     def binding(self, z: FloatArray, gradients: FloatArray, pairs: IntArray) -> Bound | None:
         """Which bound ends a motion at a configuration; None if stability does.
 

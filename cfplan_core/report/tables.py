@@ -79,7 +79,7 @@ def _titled(title: str, table: Table) -> Group:
 def _segment_table(result: PlanResult) -> Table:
     table = _new_table()
     table.add_column('No.', justify='right')
-    table.add_column('Contacts,\n- broken and + made\nat the end', overflow='fold')
+    table.add_column('Contacts; at the end\n- broken and + made', overflow='fold')
     planned = any(segment.control is not None for segment in result.segments)
     heading = 'Stability,\nneeded force' + (',\nby torque' if planned else '')
     table.add_column(heading, overflow='fold')
@@ -126,9 +126,9 @@ def _needed(force: float | None) -> str:
 
 
 def _contacts(segment: Segment, end: SegmentEnd) -> list[str]:
-    """Contacts of a segment, marked if they break at its end, and those that are made there."""
-    marked = [f'{name} -' if name in end.broken else name for name in segment.contacts]
-    return marked + [f'{name} +' for name in end.made]
+    """Contacts of a segment, then those that break and those that are made at its end."""
+    broken = [f'- {name}' for name in end.broken]
+    return [*segment.contacts, *broken, *[f'+ {name}' for name in end.made]]
 
 
 def _torque_controlled(control: Mapping[str, str] | None) -> str:

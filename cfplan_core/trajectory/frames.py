@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -111,8 +111,8 @@ def build_frames(
             contacts = system.contact_names(leg.formation.pairs)
             needed = float(model.needed_forces(gradients).max())
             last = first + len(z) - 1
-            control = profile.add(gradients, z, low, high)
-            segments.append(Segment(contacts, stability.value, first, last, needed, control))
+            segments.append(Segment(contacts, stability.value, first, last, needed))
+            profile.add(gradients, z, low, high)
             entry_lower.append(low[0])
             entry_upper.append(high[0])
             shared = 1 if points else 0
@@ -121,18 +121,21 @@ def build_frames(
             upper.append(high[shared:])
             first += len(z) - 1
     z = np.concatenate(points)
-    torque_nominal, entry_nominal = profile.joined()
+    torques = profile.joined()
     return Frames(
         _times(system, z, segments, options),
         z[:, 3:],
         system.object_poses(z),
         np.concatenate(lower),
         np.concatenate(upper),
-        tuple(segments),
+        tuple(
+            replace(segment, control=control)
+            for segment, control in zip(segments, torques.controls, strict=True)
+        ),
         np.array(entry_lower),
         np.array(entry_upper),
-        torque_nominal,
-        entry_nominal,
+        torques.torques,
+        torques.entries,
     )
 
 

@@ -6,6 +6,9 @@ linear in s̈ and ṡ², and toppra finds the largest ṡ that can be sped up to
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from cfplan_core.geometry.polygon import FloatArray
@@ -101,40 +104,59 @@ def _profile(
     acceleration: FloatArray,
 ) -> FloatArray | None:
     """Run TOPP-RA: ṡ on the grid, shape (g,), or None."""
-    # They cost most of a second to import.
-    from toppra.algorithm import TOPPRA
-    from toppra.constraint import (
-        DiscretizationType,
-        JointAccelerationConstraint,
-        LinearConstraint,
+    solver, limits = _toppra()
+    problem = solver(
+        [limits(first, second, speeds, acceleration)],
+        _Path(first.shape[1], grid[[0, -1]]),
+        grid,
     )
-    from toppra.interpolator import AbstractGeometricPath
-
-    class Path(AbstractGeometricPath):  # type: ignore[misc]
-        """Derivatives on the grid, which is all that is asked for."""
-
-        dof = first.shape[1]
-        path_interval = grid[[0, -1]]
-        waypoints = (grid, first)
-
-        def __call__(self, positions: FloatArray, order: int = 0) -> FloatArray:
-            return (first, first, second)[order]
-
-    class Speed(LinearConstraint):  # type: ignore[misc]
-        """Bounds of ṡ²."""
-
-        dof = first.shape[1]
-        _format_string = ''
-
-        def compute_constraint_params(self, *_: object) -> tuple[FloatArray | None, ...]:
-            bounds = np.column_stack([np.zeros_like(speeds), speeds**2])
-            return (*[None] * 6, bounds)
-
-    limits = np.column_stack([-acceleration, acceleration])
-    constraints = [
-        Speed(),
-        JointAccelerationConstraint(limits, discretization_scheme=DiscretizationType.Collocation),
-    ]
-    problem = TOPPRA(constraints, Path(), gridpoints=grid, solver_wrapper='seidel')
     _, profile, _ = problem.compute_parameterization(0.0, 0.0)
     return None if profile is None or np.isnan(profile).any() else np.asarray(profile)
+
+
+class _Path(NamedTuple):
+    """What toppra asks of a path whose constraints bring their own derivatives."""
+
+    dof: int
+    path_interval: FloatArray
+
+
+@cache
+def _toppra() -> tuple[Any, Any]:
+    """TOPP-RA and a constraint of velocity and acceleration on a grid."""
+    # It costs most of a second to import.
+    from toppra.algorithm import TOPPRA
+    from toppra.algorithm.algorithm import ParameterizationAlgorithm
+    from toppra.constraint import LinearConstraint
+    from toppra.solverwrapper.cy_seidel_solverwrapper import seidelWrapper
+
+    class Solver(TOPPRA):  # type: ignore[misc]
+        """With its own solver; TOPPRA's constructor looks on disk for others each time."""
+
+        def __init__(self, constraints: list[Any], path: _Path, grid: FloatArray) -> None:
+            ParameterizationAlgorithm.__init__(self, constraints, path, gridpoints=grid)
+            self.solver_wrapper = seidelWrapper(constraints, path, self.gridpoints, True)
+
+    class Limits(LinearConstraint):  # type: ignore[misc]
+        """Bounds of ṡ, and |q' s̈ + q'' ṡ²| within limits at each point of the grid."""
+
+        def __init__(
+            self,
+            first: FloatArray,
+            second: FloatArray,
+            speeds: FloatArray,
+            acceleration: FloatArray,
+        ) -> None:
+            super().__init__()
+            self.dof = first.shape[1]
+            self.identical = True
+            bounds = np.column_stack([np.zeros_like(speeds), speeds**2])
+            both = np.concatenate([np.eye(self.dof), -np.eye(self.dof)])
+            limit = np.concatenate([acceleration, acceleration])
+            still = np.zeros_like(first)
+            self._parameters = (first, second, still, both, limit, None, bounds)
+
+        def compute_constraint_params(self, *_: object) -> tuple[FloatArray | None, ...]:
+            return self._parameters
+
+    return Solver, Limits

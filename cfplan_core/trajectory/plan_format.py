@@ -117,7 +117,6 @@ def _segment_complaints(
             yield f'segments[{k}].last_frame', str(last), f'more than first_frame, {first}'
         if last >= frame_count:
             yield f'segments[{k}].last_frame', str(last), f'at most {frame_count - 1}'
-        yield from _end_complaints(segments, k)
         for name in segment.get('control', {}):
             if name not in joint_names:
                 yield f'segments[{k}].control', repr(name), 'names of joint_names'
@@ -128,21 +127,6 @@ def _segment_complaints(
             str(expected_first),
             f'{frame_count - 1}, as segments cover all frames',
         )
-
-
-def _end_complaints(segments: list[dict[str, Any]], k: int) -> Iterator[Complaint]:
-    """A segment's end must be what follows from its contacts and those of the next."""
-    if 'end' not in segments[k]:
-        return
-    here, end = set(segments[k]['contacts']), segments[k]['end']
-    after = set(segments[k + 1]['contacts']) if k + 1 < len(segments) else here
-    for key, names in (('made', after - here), ('broken', here - after)):
-        if set(end[key]) != names:
-            expected = f'{sorted(names)}, by the contacts of the segments'
-            yield f'segments[{k}].end.{key}', _short(end[key]), expected
-    event = 'goal' if k + 1 == len(segments) else 'stability' if here == after else 'contacts'
-    if end['event'] != event:
-        yield f'segments[{k}].end.event', repr(end['event']), repr(event)
 
 
 def _non_finite(value: Any, where: str) -> Iterator[Complaint]:

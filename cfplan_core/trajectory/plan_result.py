@@ -8,6 +8,7 @@ from enum import Enum
 
 import numpy as np
 
+from cfplan_core.errors import Finding
 from cfplan_core.geometry.polygon import FloatArray
 
 
@@ -111,6 +112,7 @@ class PlanResult:
         entry_nominal: As `entry_lower`.
         margin: Worst robustness margin of the plan, where it was chosen among several, else None.
         alternatives: Other plans, the next best first, each without further ones.
+        findings: Everything that is wrong, if invalid. Not in plan files.
     """
 
     problem: str
@@ -132,6 +134,7 @@ class PlanResult:
     entry_nominal: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     margin: float | None = None
     alternatives: tuple[PlanResult, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     @property
     def solved(self) -> bool:

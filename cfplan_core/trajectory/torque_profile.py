@@ -14,12 +14,13 @@ Which joints are controlled in torque, `cfplan_core.mechanics.control_roles` tel
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.mechanics.contact_model import ContactModel
+from cfplan_core.mechanics.contact_model import Actuation, ContactModel, Holding
 from cfplan_core.mechanics.control_roles import Roles
 
 Limits = tuple[FloatArray, FloatArray]
@@ -30,6 +31,22 @@ POSITION, EFFORT = 'position', 'effort'
 _STILL = 1e-12
 # A change of roles is a disturbance: they are kept while the margin is this share of the best.
 _KEPT = 0.5
+
+
+class Profile(NamedTuple):
+    """Nominal torques of a plan and who supplies them.
+
+    Attributes:
+        torques: Shape (f, n), N·m; a frame that two segments share has one inside the limits of
+            the earlier segment.
+        entries: Shape (segments, n), torques of each segment at its first frame, inside its own
+            limits.
+        controls: For each segment how to control each joint.
+    """
+
+    torques: FloatArray
+    entries: FloatArray
+    controls: tuple[dict[str, str], ...]
 
 
 class TorqueProfile:
@@ -49,13 +66,11 @@ class TorqueProfile:
         self._unit = system.force_unit * system.size
         joints = system.problem.hand.joints
         self._effort = np.array([joint.effort_limit for joint in joints])
-        self._effort_joints: tuple[int, ...] = ()
-        self._middles: list[FloatArray] = []
-        self._limits: list[tuple[Limits, Limits]] = []
+        self._stretches: list[Holding] = []
+        self._weights: list[FloatArray] = []
+        self._limits: list[Limits] = []
 
-    def add(
-        self, gradients: FloatArray, z: FloatArray, low: FloatArray, high: FloatArray
-    ) -> dict[str, str]:
+    def add(self, gradients: FloatArray, z: FloatArray, low: FloatArray, high: FloatArray) -> None:
         """Append a segment.
 
         Args:
@@ -63,51 +78,54 @@ class TorqueProfile:
             z: Shape (s, 3 + n).
             low: Shape (s, n), torque limits with the links' weight, N·m.
             high: As `low`.
-
-        Returns:
-            How to control each joint.
         """
         weight = self._system.link_weight_torques(z)
         effort = self._effort / self._unit
-        middle, roles = self._model.actuation(
-            gradients, -effort - weight, effort - weight, self._squeeze
-        )
-        # The middle of an interval of no width may be beside it by rounding.
-        middle = np.fmin(np.fmax((middle + weight) * self._unit, low), high)
-        self._middles.append(middle)
-        within = np.fmax(low, -self._effort), np.fmin(high, self._effort)
-        self._limits.append(((within[0][0], within[1][0]), (within[0][-1], within[1][-1])))
-        self._effort_joints = self._chosen(roles)
-        return {
-            name: EFFORT if joint in self._effort_joints else POSITION
-            for joint, name in enumerate(self._system.problem.hand.joint_names)
-        }
+        self._stretches.append(Holding(gradients, -effort - weight, effort - weight))
+        self._weights.append(weight)
+        self._limits.append((low, high))
 
-    def _chosen(self, roles: Sequence[Roles]) -> tuple[int, ...]:
-        """The best roles, or those of the segment before if they are nearly as good."""
-        best = roles[0]
-        for choice in roles:
-            if choice.effort == self._effort_joints and choice.margin >= _KEPT * best.margin:
-                return choice.effort
-        return best.effort
-
-    def joined(self) -> tuple[FloatArray, FloatArray]:
-        """Join the segments at the frames that they share.
-
-        Returns:
-            The torques of all frames, shape (f, n), N·m; a shared frame has one inside the limits
-            of the earlier segment. And those of each segment at its first frame, inside its own
-            limits, shape (segments, n).
-        """
-        middles = [middle.copy() for middle in self._middles]
+    def joined(self) -> Profile:
+        """Find the middles of the segments and join them at the frames that they share."""
+        actuations = self._model.actuation(self._stretches, self._squeeze)
+        own, within = [], []
+        for actuation, weight, (low, high) in zip(
+            actuations, self._weights, self._limits, strict=True
+        ):
+            middle = (actuation.torques + weight) * self._unit
+            # The middle of an interval of no width may be beside it by rounding.
+            own.append(np.fmin(np.fmax(middle, low), high))
+            within.append((np.fmax(low, -self._effort), np.fmin(high, self._effort)))
+        middles = [middle.copy() for middle in own]
         for k in range(len(middles) - 1):
-            before, after = self._middles[k][-1], self._middles[k + 1][0]
-            leaves, enters = self._limits[k][1], self._limits[k + 1][0]
+            before, after = own[k][-1], own[k + 1][0]
+            leaves = within[k][0][-1], within[k][1][-1]
+            enters = within[k + 1][0][0], within[k + 1][1][0]
             middles[k][-1] = _towards(before, after, leaves, enters)
             middles[k + 1][0] = _towards(after, before, enters, leaves)
         entries = np.array([middle[0] for middle in middles])
         rows = [middle[1 if k else 0 :] for k, middle in enumerate(middles)]
-        return np.concatenate(rows), entries
+        return Profile(np.concatenate(rows), entries, self._controls(actuations))
+
+    def _controls(self, actuations: Sequence[Actuation]) -> tuple[dict[str, str], ...]:
+        """How to control each joint in each segment."""
+        names = self._system.problem.hand.joint_names
+        chosen: tuple[int, ...] = ()
+        controls = []
+        for actuation in actuations:
+            chosen = _roles(actuation.roles, chosen)
+            effort = {names[joint] for joint in chosen}
+            controls.append({name: EFFORT if name in effort else POSITION for name in names})
+        return tuple(controls)
+
+
+def _roles(roles: Sequence[Roles], before: tuple[int, ...]) -> tuple[int, ...]:
+    """The best roles, or those of the segment before if they are nearly as good."""
+    best = roles[0]
+    for choice in roles:
+        if choice.effort == before and choice.margin >= _KEPT * best.margin:
+            return choice.effort
+    return best.effort
 
 
 def _towards(start: FloatArray, end: FloatArray, own: Limits, other: Limits) -> FloatArray:

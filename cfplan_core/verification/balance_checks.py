@@ -173,7 +173,7 @@ def check_control(holds: Sequence[Hold], control: Mapping[str, str], record: Rec
         record: Where to.
     """
     names = holds[0].mechanism.problem.hand.joint_names
-    owner, frame = holds[0].owner, holds[0].frame
+    owner, frame = holds[0].owner, holds[min(1, len(holds) - 1)].frame
     known = set(control) == set(names) and set(control.values()) <= {'position', 'effort'}
     message = f'{owner} has control {dict(control)}, expected position or effort for each joint'
     if not record.require('control', known, frame, message):

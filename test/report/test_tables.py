@@ -127,7 +127,7 @@ def test_contacts_that_break_and_are_made_are_marked(result: PlanResult) -> None
             assert name in text
         for names, mark in ((end.broken, '-'), (end.made, '+')):
             for name in names:
-                assert f'{name} {mark}' in text
+                assert f'{mark} {name}' in text
                 found += 1
     assert found > 4
 

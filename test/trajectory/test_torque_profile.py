@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +14,7 @@ from cfplan_core.contact.detection import touching
 from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.errors import CfplanError
-from cfplan_core.mechanics.contact_model import Actuation
+from cfplan_core.mechanics.contact_model import Actuation, Holding
 from cfplan_core.mechanics.control_roles import Roles
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.options import TrajectoryOptions
@@ -82,24 +83,24 @@ def test_at_an_event_the_torques_are_inside_the_limits_of_both_segments_where_th
     assert met > 3
 
 
-def profile_of(*stretches: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+def profile_of(*segments: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
     """A profile of segments of one joint, each with limits and a nominal torque all along."""
 
     class Given(FrictionlessModel):
-        nominal = 0.0
-
-        def actuation(self, gradients, lower, upper, squeeze):  # type: ignore[no-untyped-def]
-            return Actuation(np.full((2, 2), self.nominal), (Roles((), np.inf),))
+        def actuation(self, stretches: Sequence[Holding], squeeze: float) -> tuple[Actuation, ...]:
+            unit = system.force_unit * system.size
+            roles = (Roles((), np.inf),)
+            return tuple(
+                Actuation(np.full((2, 2), nominal / unit), roles) for _, nominal, _ in segments
+            )
 
     system = ContactSystem(pushed_block())
-    model = Given(system.load)
-    profile = TorqueProfile(system, model, 5.0)
-    for low, nominal, high in stretches:
-        model.nominal = nominal / (system.force_unit * system.size)
+    profile = TorqueProfile(system, Given(system.load), 5.0)
+    for low, _, high in segments:
         shape, z = (2, 2), np.zeros((2, system.dof))
         profile.add(np.zeros((2, 4, 5)), z, np.full(shape, low), np.full(shape, high))
-    torques, entries = profile.joined()
-    return torques[:, 0], entries[:, 0]
+    joined = profile.joined()
+    return joined.torques[:, 0], joined.entries[:, 0]
 
 
 def test_limits_that_overlap_are_crossed_in_the_middle_of_the_overlap() -> None:
@@ -128,7 +129,9 @@ def test_a_pushed_block_is_pressed_half_as_hard_as_it_can_bear() -> None:
     heights = np.sin(z[0, 3:]) * [LEFT, 0.045]
     pairs = np.array(touching(system, z[0], 1e-6))
     gradients = gap_gradients(system, system.place(z), pairs)
-    torque = model.actuation(gradients, np.full((1, 2), -99.0), np.full((1, 2), 99.0), 50.0)[0]
+    limit = np.full((1, 2), 99.0)
+    (held,) = model.actuation([Holding(gradients, -limit, limit)], 50.0)
+    torque = held.torques
     force = 0.1 * 9.81 * HALF / abs(heights[0] - heights[1])
     expected = 0.5 * force * heights * [-1.0, 1.0]
     unit = system.force_unit * system.size

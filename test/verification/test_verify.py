@@ -427,7 +427,7 @@ def test_left_finger_that_lifts_off_cannot_be_in_torque_control(sliding: Plan) -
     problem, result = controlled(sliding, 'effort', 'position')
     report = verify_plan(problem, result)
     assert failed(report) == {'control'}
-    assert frames_failing(report, 'control') == {8}
+    assert frames_failing(report, 'control') == {9}
 
 
 def test_control_of_an_unknown_joint_is_found(sliding: Plan) -> None:
