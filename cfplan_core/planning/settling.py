@@ -59,10 +59,9 @@ class Settling:
         if piece.index not in self._beside:
             self._beside[piece.index] = []
             for z in self._places(piece):
-                for found in self._behind(z):
-                    if found is not piece:
-                        self._beside[piece.index].append((z, found))
-                        self._back.setdefault(found.index, []).append((z, piece))
+                for found in self._behind(piece, z):
+                    self._beside[piece.index].append((z, found))
+                    self._back.setdefault(found.index, []).append((z, piece))
         return [*self._beside[piece.index], *self._back.get(piece.index, ())]
 
     def _places(self, piece: Piece) -> Iterator[FloatArray]:
@@ -201,15 +200,17 @@ class Settling:
             frozenset(int(pair) for pair in around.pairs[left]),
         )
 
-    def _behind(self, z: FloatArray) -> Iterator[Piece]:
-        """Pieces that ways out of a configuration lead to."""
+    def _behind(self, piece: Piece, z: FloatArray) -> Iterator[Piece]:
+        """Pieces that ways out of the end of another lead to."""
         roadmap = self._roadmap
         for way in self.ways(z):
+            if way.formation == piece.formation:
+                continue
             roadmap.attempts += 1
             rows, _ = formation_equations(roadmap.system, way.formation.array, z)
             if roadmap.system.dof - len(rows) > 1:
-                piece: Piece | None = roadmap.regions.enter(z, way)
+                found: Piece | None = roadmap.regions.enter(z, way)
             else:
-                piece = roadmap.curve_along(z, way)
-            if piece is not None:
-                yield piece
+                found = roadmap.curve_along(z, way)
+            if found is not None:
+                yield found

@@ -1,0 +1,223 @@
+"""Plans through grasps of two contacts, as a user sees them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from planning.pegs import HALF, WIDTH, cradle, formation, two_fingers
+
+from cfplan_core import (
+    PlanOptions,
+    PlanResult,
+    Problem,
+    explore,
+    load_problem,
+    plan,
+    read_plan,
+    verify_plan,
+    write_plan,
+)
+from cfplan_core.contact.system import ContactSystem
+from cfplan_core.model import Goal, Grasp
+from cfplan_core.planning.grasp_check import check_problem, describe_grasp
+from cfplan_core.planning.manifold import project
+from cfplan_core.trajectory.plan_margin import plan_ratios
+from cfplan_core.trajectory.plan_result import Status
+
+FOLDER = Path(__file__).parents[1] / 'config' / 'problems'
+LEDGES = load_problem(FOLDER / 'second_order' / 'square_between_ledges.yaml')
+
+
+@cache
+def between_ledges(prefer: str = 'first') -> PlanResult:
+    return plan(LEDGES, PlanOptions(prefer=prefer))
+
+
+def symmetric(problem: Problem, spread: float) -> Grasp:
+    """The square upright on two fingertips that are WIDTH + 2 spread apart, at equal heights."""
+    finger = problem.hand.fingers[1]
+    x = WIDTH / 2 + spread - finger.base[0]
+    reach = finger.links[0].length
+    angle = np.pi - np.arccos(-x / reach)
+    tip = finger.base[1] + reach * np.sin(angle)
+    pose = (0.0, tip + HALF - (WIDTH / 2 + spread), 0.0)
+    return Grasp(pose, (np.pi - angle, angle))
+
+
+def moved(problem: Problem, start: Grasp, goal: Grasp) -> Problem:
+    joints = dict(zip(problem.hand.joint_names, goal.joints, strict=True))
+    return replace(problem, start=start, goal=Goal(goal.object_pose, joints))
+
+
+@pytest.mark.parametrize('prefer', ['first', 'fewest-segments', 'shortest', 'robust'])
+def test_way_between_ledges_leads_over_two_contacts_and_is_certified(prefer: str) -> None:
+    result = between_ledges(prefer)
+    assert result.solved, result.message
+    assert [segment.stability for segment in result.segments] == [
+        'force_closure',
+        'second_order',
+        'force_closure',
+    ]
+    report = verify_plan(LEDGES, result)
+    assert report.ok, report.failures
+
+
+def test_without_second_order_there_is_no_way_between_the_ledges() -> None:
+    result = plan(LEDGES, PlanOptions(second_order=False))
+    assert result.status is Status.INFEASIBLE
+    assert 'with stability of first order was explored' in result.message
+
+
+def test_torques_are_continuous_where_a_contact_lets_go() -> None:
+    result = between_ledges()
+    for k, segment in enumerate(result.segments[1:], start=1):
+        at = segment.first_frame
+        np.testing.assert_allclose(result.entry_lower[k], result.torque_lower[at], atol=1e-9)
+        np.testing.assert_allclose(result.entry_upper[k], result.torque_upper[at], atol=1e-9)
+
+
+def test_torque_of_two_contacts_is_that_of_virtual_work() -> None:
+    """The joint raises the weight: τ = m g dy/dθ along the plan, by differences of its frames."""
+    result = between_ledges()
+    segment = result.segments[1]
+    rows = slice(segment.first_frame, segment.last_frame + 1)
+    height, angle = result.object_poses[rows, 1], result.joints[rows, 0]
+    expected = 0.1 * 9.81 * np.gradient(height, angle)
+    np.testing.assert_allclose(result.torque_lower[rows, 0][2:-2], expected[2:-2], atol=3e-4)
+    np.testing.assert_array_equal(result.torque_lower[rows][1:], result.torque_upper[rows][1:])
+
+
+def test_plan_file_keeps_the_class(tmp_path: Path) -> None:
+    write_plan(between_ledges(), tmp_path / 'plan.json')
+    again = read_plan(tmp_path / 'plan.json')
+    assert again.segments == between_ledges().segments
+    assert verify_plan(LEDGES, again).ok
+
+
+def test_reversed_plan_is_certified() -> None:
+    back = between_ledges().reversed()
+    goal = LEDGES.goal.grasp(LEDGES.hand)
+    assert goal is not None
+    assert verify_plan(moved(LEDGES, goal, LEDGES.start), back).ok
+
+
+def test_claim_of_force_closure_for_two_contacts_is_found() -> None:
+    result = between_ledges()
+    first, second, third = result.segments
+    lie = replace(result, segments=(first, replace(second, stability='force_closure'), third))
+    assert not verify_plan(LEDGES, lie).ok
+
+
+def test_two_contacts_that_touch_but_do_not_balance_are_found() -> None:
+    """The square of one frame turned by 1e-4 along both contacts, with the joint where it was."""
+    result = between_ledges()
+    system = ContactSystem(LEDGES)
+    z = system.configuration(Grasp(result.object_poses[5], result.joints[5]))
+    pairs = formation(system, *result.segments[1].contacts).array
+    held = np.eye(system.dof)[[2, 3]]
+    turned = project(system, pairs, z, held, (z + 1e-4 * np.eye(system.dof)[2])[None]).points
+    poses = result.object_poses.copy()
+    poses[5] = system.object_poses(turned)[0]
+    report = verify_plan(LEDGES, replace(result, object_poses=poses))
+    assert {(failure.frame, failure.check) for failure in report.failures} >= {(5, 'stability')}
+
+
+def test_grasp_of_two_contacts_is_described_and_accepted() -> None:
+    problem = cradle()
+    described = describe_grasp(problem, problem.start)
+    assert (described.stability, described.dimension) == ('second_order', 1)
+    assert check_problem(problem) == ()
+
+
+def test_rounded_grasp_of_two_contacts_is_brought_into_balance() -> None:
+    problem = cradle()
+    pose = tuple(np.round(np.array(problem.start.object_pose) + np.array([2e-8, -3e-8, 1e-7]), 9))
+    joints = np.round(problem.start.joints, 7)
+    rounded = replace(
+        problem, start=Grasp(pose, joints), goal=Goal(contacts=('object.e2|palm.0.v2',))
+    )
+    assert describe_grasp(rounded, rounded.start).stability == 'second_order'
+    result = plan(rounded)
+    assert result.solved
+    assert verify_plan(rounded, result).ok
+
+
+@pytest.mark.parametrize('turn', [1e-4, 0.01])
+def test_two_contacts_off_balance_are_refused(turn: float) -> None:
+    """Turned along both contacts, so that they touch and do not hold."""
+    problem = cradle()
+    corner = WIDTH / 2 * np.array([np.sin(2.0 * turn), -np.cos(2.0 * turn)])
+    pose = (corner[0] - HALF * np.sin(turn), corner[1] + HALF * np.cos(turn), turn)
+    off = replace(problem, start=Grasp(pose, problem.start.joints))
+    (finding,) = check_problem(off)
+    assert finding.field == 'start'
+    assert 'unstable' in finding.value
+
+
+def test_start_of_two_contacts_is_refused_where_second_order_does_not_count() -> None:
+    result = plan(cradle(), PlanOptions(second_order=False))
+    assert result.status is Status.INVALID
+    assert 'stability of second order does not count' in result.message
+    assert 'at least three contacts' in result.message
+
+
+@pytest.mark.parametrize(
+    'options',
+    [
+        PlanOptions(),
+        PlanOptions(prefer='shortest'),
+        PlanOptions(max_needed_force=1.2),
+        PlanOptions(max_contacts=3),
+    ],
+    ids=['first', 'shortest', 'force', 'contacts'],
+)
+def test_two_fingers_lower_the_square_by_spreading(options: PlanOptions) -> None:
+    """On the way that is symmetric its height is known; the plan's ends lie on it."""
+    problem = two_fingers(())
+    problem = moved(problem, symmetric(problem, 0.0), symmetric(problem, 0.004))
+    result = plan(problem, options)
+    assert result.solved, result.message
+    assert {segment.stability for segment in result.segments} == {'second_order'}
+    report = verify_plan(problem, result)
+    assert report.ok, report.failures
+
+
+def test_held_finger_leaves_a_curve() -> None:
+    problem = two_fingers(())
+    start = symmetric(problem, 0.002)
+    name = problem.hand.joint_names[0]
+    goal = Goal(joints={problem.hand.joint_names[1]: float(start.joints[1]) + 0.02})
+    problem = replace(problem, start=start, goal=goal)
+    result = plan(problem, PlanOptions(held_joints=(name,)))
+    assert result.solved, result.message
+    assert np.ptp(result.joints[:, 0]) == 0.0
+    assert verify_plan(problem, result).ok
+
+
+def test_exploration_shows_the_class_unless_it_does_not_count() -> None:
+    found = explore(LEDGES)
+    classes = [found.graph.nodes[k]['stability'] for k in found.graph]
+    assert sorted(classes) == ['force_closure', 'force_closure', 'second_order']
+    strict = explore(LEDGES, second_order=False)
+    assert {strict.graph.nodes[k]['stability'] for k in strict.graph} == {'force_closure'}
+
+
+def test_example_problem_has_the_same_plan_with_and_without() -> None:
+    problem = load_problem(FOLDER / 'h122.yaml')
+    with_it, without = (plan(problem, PlanOptions(second_order=s)) for s in (True, False))
+    assert with_it.segments == without.segments
+    np.testing.assert_array_equal(with_it.joints, without.joints)
+
+
+def test_margin_does_not_vanish_where_the_square_settles() -> None:
+    """Two contacts hold it there: what the third carries does not matter."""
+    ratios = plan_ratios(LEDGES, between_ledges())
+    for before, after in pairwise(ratios):
+        assert before.hold[-1] == pytest.approx(after.hold[0], rel=1e-4)
+        assert before.hold[-1] > 0.5
+    assert between_ledges('robust').margin > 0.05
