@@ -109,6 +109,7 @@ class Regions:
                     for at, piece in found
                     if apart(at) or (piece is not region and index != region.index)
                 ]
+        self._roadmap.settling.drop(region, z)
 
     def reach(self, region: Region, columns: IntArray, wanted: FloatArray) -> Iterator[FloatArray]:
         """Drive some coordinates towards wanted values, shape (m,), inside a region.

@@ -24,7 +24,7 @@ from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.mechanics.second_order import imbalance, pair_forces
 from cfplan_core.planning.equations import EQUILIBRIUM, equations
 from cfplan_core.planning.manifold import formation_equations, tangent_basis
-from cfplan_core.planning.pieces import Piece, Region
+from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.tracing import STABILITY_MARGIN
 from cfplan_core.planning.transitions import Departure, Surroundings
 
@@ -63,6 +63,17 @@ class Settling:
                     self._beside[piece.index].append((z, found))
                     self._back.setdefault(found.index, []).append((z, piece))
         return [*self._beside[piece.index], *self._back.get(piece.index, ())]
+
+    def drop(self, region: Region, z: FloatArray) -> None:
+        """Forget that a region is entered or left at a configuration, shape (3 + n,)."""
+        for table in (self._beside, self._back):
+            for index, found in table.items():
+                table[index] = [
+                    (at, piece)
+                    for at, piece in found
+                    if np.abs(at - z).max() > SAME
+                    or (piece is not region and index != region.index)
+                ]
 
     def _places(self, piece: Piece) -> Iterator[FloatArray]:
         """Configurations at the end of a piece where two contacts may balance the object."""

@@ -28,7 +28,7 @@ from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Grasp, Problem
 from cfplan_core.planning.events import EventKind
 from cfplan_core.planning.manifold import settle
-from cfplan_core.planning.pieces import Piece
+from cfplan_core.planning.pieces import Piece, Region
 from cfplan_core.planning.roadmap import Roadmap
 
 TIPS = ('object.e2|left.link.v1', 'object.e3|right.link.v1')
@@ -145,6 +145,17 @@ def test_object_does_not_settle_onto_two_contacts_that_would_drop_it() -> None:
     assert lowest_nearby(system, z, pairs, 3e-3) < 0.0
     assert roadmap.settling.ways(z) == []
     assert roadmap.settling.beside(piece) == []
+
+
+def test_way_that_is_dropped_is_not_offered_again_on_either_side() -> None:
+    problem = two_fingers()
+    roadmap, piece = rooted(problem, *TIPS)
+    assert isinstance(piece, Region)
+    z, other = roadmap.settling.beside(piece)[0]
+    roadmap.regions.drop(piece, z)
+    for one in (piece, other):
+        places = [at for at, found in roadmap.settling.beside(one) if found in (piece, other)]
+        assert all(np.abs(at - z).max() > 1e-6 for at in places)
 
 
 def test_nothing_settles_where_second_order_does_not_count() -> None:
