@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # Forces of others than two contacts, in weights, that count as none where stability ends.
 _HARDLY = 1e-4
 # How far, in radians and object sizes, they may vanish behind that.
-_BEHIND = 1e-3
+BEHIND = 1e-3
 _BALANCED = 1e-8
 # Rates of gaps and forces along a motion below this are none.
 _RATE = 1e-7
@@ -125,7 +125,7 @@ class Settling:
             forces, rest = pair_forces(wrenches[None, pair], tracer.system.load)
             if rest[0] < _HARDLY * (1.0 + forces.max()) and forces.min() > STABILITY_MARGIN:
                 found = self._vanishing(formation, formation.array[list(pair)], z)
-                if found is not None and np.abs(found - z).max() < _BEHIND:
+                if found is not None and np.abs(found - z).max() < BEHIND:
                     return found
         return None
 
