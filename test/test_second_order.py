@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from planning.pegs import HALF, WIDTH, cradle, formation, two_fingers
+from planning.pegs import HALF, WIDTH, cradle, formation, lowest_nearby, two_fingers
 
 from cfplan_core import (
     PlanOptions,
@@ -22,12 +23,22 @@ from cfplan_core import (
     verify_plan,
     write_plan,
 )
+from cfplan_core.contact.curvature import wrench_rates
+from cfplan_core.contact.formation import Formation
+from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem
+from cfplan_core.exploration import Exploration, configurations
+from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.contact_model import Stability
+from cfplan_core.mechanics.second_order import curvature
 from cfplan_core.model import Goal, Grasp
 from cfplan_core.planning.grasp_check import check_problem, describe_grasp
 from cfplan_core.planning.manifold import project
 from cfplan_core.trajectory.plan_margin import plan_ratios
 from cfplan_core.trajectory.plan_result import Status
+from cfplan_core.verification.mechanism import mechanism_of
+from cfplan_core.verification.second_order import second_order_margin
+from cfplan_core.verification.touching import parse_pair
 
 FOLDER = Path(__file__).parents[1] / 'config' / 'problems'
 LEDGES = load_problem(FOLDER / 'second_order' / 'square_between_ledges.yaml')
@@ -205,6 +216,49 @@ def test_exploration_shows_the_class_unless_it_does_not_count() -> None:
     assert sorted(classes) == ['force_closure', 'force_closure', 'second_order']
     strict = explore(LEDGES, second_order=False)
     assert {strict.graph.nodes[k]['stability'] for k in strict.graph} == {'force_closure'}
+
+
+@cache
+def explored(name: str) -> Exploration:
+    return explore(load_problem(FOLDER / f'{name}.yaml'))
+
+
+def held_by_two(found: Exploration) -> Iterator[tuple[Formation, FloatArray]]:
+    """Some configurations of all parts that are stable to second order."""
+    for piece in found.pieces():
+        if piece.stability is Stability.SECOND_ORDER:
+            points = configurations(piece)
+            yield piece.formation, points[:: max(1, len(points) // 6)]
+
+
+def test_curvature_is_that_which_the_verifier_finds_by_differences_of_gaps() -> None:
+    """Every part of the example that two contacts hold, far from the scenes made for them."""
+    found = explored('h122')
+    system, mechanism = found.system, mechanism_of(found.problem)
+    compared = 0
+    for formation_of_two, points in held_by_two(found):
+        names = system.contact_names(formation_of_two.pairs)
+        contacts = [parse_pair(name, mechanism) for name in names]
+        placed = system.place(points)
+        wrenches = gap_gradients(system, placed, formation_of_two.array)[..., :3]
+        rates = wrench_rates(system, placed, formation_of_two.array)
+        claimed = curvature(wrenches, rates, system.load)
+        for z, value in zip(points, claimed, strict=True):
+            scene = mechanism.scene(system.object_poses(z[None])[0], z[3:])
+            expected = second_order_margin(mechanism, scene, contacts)
+            assert value == pytest.approx(expected, rel=1e-4, abs=1e-5)
+            assert expected > 0.0
+            compared += 1
+    assert compared > 20
+
+
+def test_energy_is_least_wherever_two_contacts_are_said_to_hold() -> None:
+    found = explored('h122')
+    for formation_of_two, points in held_by_two(found):
+        for z in points:
+            margin = found.roadmap.tracer.margins(formation_of_two, z[None])
+            if margin.stable[0] > 0.02:
+                assert lowest_nearby(found.system, z, formation_of_two.array, 2e-3) > 0.0
 
 
 def test_example_problem_has_the_same_plan_with_and_without() -> None:
