@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from planning.pegs import HALF, WIDTH, cradle, formation, lowest_nearby, two_fingers
+from planning.pegs import HALF, WIDTH, cradle, formation, lowest_nearby, swing, two_fingers
 
 from cfplan_core import (
     PlanOptions,
@@ -194,6 +194,17 @@ def test_two_fingers_lower_the_square_by_spreading(options: PlanOptions) -> None
     result = plan(problem, options)
     assert result.solved, result.message
     assert {segment.stability for segment in result.segments} == {'second_order'}
+    report = verify_plan(problem, result)
+    assert report.ok, report.failures
+
+
+@pytest.mark.parametrize('seam', [None, 0.029], ids=['whole', 'in parts'])
+def test_bar_swings_down_as_its_wall_turns(seam: float | None) -> None:
+    problem = swing(seam)
+    problem = replace(problem, goal=Goal(joints={'wall_joint': 0.5}))
+    result = plan(problem)
+    assert result.solved, result.message
+    assert [s.stability for s in result.segments] == ['second_order'] * (1 if seam is None else 2)
     report = verify_plan(problem, result)
     assert report.ok, report.failures
 

@@ -150,7 +150,7 @@ class Settling:
     def ways(self, z: FloatArray) -> list[Departure]:
         """Formations that lead out of a configuration where two contacts balance the object."""
         around = self._roadmap.junction(z).around
-        if around is None or around.held_vertex or len(around.pairs) < 3:
+        if around is None or len(around.pairs) < 3:
             return []
         found: list[Departure] = []
         for pair in combinations(range(len(around.pairs)), 2):
@@ -191,14 +191,24 @@ class Settling:
         self, around: Surroundings, kept: list[int], rising: list[FloatArray]
     ) -> Departure | None:
         """Way into a formation along which gaps open and given slopes rise, if there is one."""
+        if around.together[np.ix_(kept, kept)].any():
+            return None
         formation = Formation(tuple(int(pair) for pair in around.pairs[kept]))
         _, gradients = formation_equations(self._roadmap.system, formation.array, around.z)
         basis = tangent_basis(gradients)
         if not len(basis):
             return None
-        left = [k for k in range(len(around.pairs)) if k not in kept]
+        # Where a vertex lies on a vertex the contact that is kept decides how others part.
+        beside = around.together[:, kept].any(axis=1)
+        left = [k for k in range(len(around.pairs)) if k not in kept and not beside[k]]
+        rates = np.abs(around.gradients[left] @ basis.T)
+        still = np.asarray(rates.max(axis=1) < _RATE)
+        opening = [k for k, rests in zip(left, still, strict=True) if not rests]
+        # What stays in touch must leave the end of its edge, what is kept must not.
+        passing = [k for k, rests in zip(left, still, strict=True) if rests]
         sliding = [k for k in kept if around.at_end[k]]
-        wanted = np.array([*rising, *around.gradients[left], *around.inward[sliding]]) @ basis.T
+        rising = [*rising, *around.gradients[opening], *around.inward[sliding]]
+        wanted = np.array([*rising, *-around.inward[passing]]) @ basis.T
         if not len(wanted):
             return None
         along = np.linalg.lstsq(wanted, np.ones(len(wanted)), rcond=None)[0]
@@ -208,7 +218,7 @@ class Settling:
         return Departure(
             formation,
             heading / np.linalg.norm(heading),
-            frozenset(int(pair) for pair in around.pairs[left]),
+            frozenset(int(pair) for pair in around.pairs[opening]),
         )
 
     def _behind(self, piece: Piece, z: FloatArray) -> Iterator[Piece]:

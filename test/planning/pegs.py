@@ -114,6 +114,21 @@ def rocker(length: float, depth: float) -> Problem:
     return _problem('rocker', walls, (far,), thing, Grasp((0.0, length / 2, 0.0), (1.0,)))
 
 
+def swing(seam: float | None = None) -> Problem:
+    """A bar, its mass below, in a V between a slope of the palm and a link that turns.
+
+    With a seam the slope consists of two parts that meet so far out.
+    """
+    parts = [(0.0, 0.2)] if seam is None else [(0.0, seam), (seam, 0.2)]
+    palm = [[(-b, b), (-b - 0.05, b - 0.05), (-a - 0.05, a - 0.05), (-a, a)] for a, b in parts]
+    joint = Joint('wall_joint', 0.3, 1.2, velocity_limit=1.0, effort_limit=5.0)
+    outline = [(0.0, -0.01), (0.2, -0.01), (0.2, 0.0), (0.0, 0.0)]
+    wall = Finger('wall', (0.0, 0.0), 0.0, (joint,), (Link('link', 0.2, outline),))
+    bar = [(-0.03, 0.0), (0.0, -0.001), (0.03, 0.0), (0.0, 0.001)]
+    thing = ManipulatedObject(bar, 0.1, (0.0, -0.05))
+    return _problem('swing', palm, (wall,), thing, Grasp((0.0, 0.03, 0.0), (math.pi / 4,)))
+
+
 def formation(system: ContactSystem, *names: str) -> Formation:
     return Formation(tuple(sorted(system.pair(parse_contact(name)) for name in names)))
 

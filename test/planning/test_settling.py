@@ -15,6 +15,7 @@ from planning.pegs import (
     cradle,
     formation,
     lowest_nearby,
+    swing,
     two_fingers,
 )
 
@@ -145,6 +146,27 @@ def test_object_does_not_settle_onto_two_contacts_that_would_drop_it() -> None:
     assert lowest_nearby(system, z, pairs, 3e-3) < 0.0
     assert roadmap.settling.ways(z) == []
     assert roadmap.settling.beside(piece) == []
+
+
+def test_two_contacts_pass_a_seam_of_the_edge_that_they_slide_on() -> None:
+    """What one slope lets the bar do, two slopes in line do in two parts."""
+    on_link = 'object.v2|wall.link.e2'
+    _, whole = rooted(swing(), 'object.v0|palm.0.e3', on_link)
+    roadmap, outer = rooted(swing(seam=0.029), 'object.v0|palm.1.e3', on_link)
+    system = roadmap.system
+    inner_formation = formation(system, 'object.v0|palm.0.e3', on_link)
+    ((seam, inner),) = [
+        (z, found)
+        for z, found in roadmap.settling.beside(outer)
+        if found.formation == inner_formation
+    ]
+    assert inner.stability is Stability.SECOND_ORDER
+    corner = system.place(seam[None]).vertices[0, 0] * system.size
+    assert abs(corner - (-0.029 + 0.029j)) < 1e-9
+    assert any(found is outer for _, found in roadmap.settling.beside(inner))
+    parts = [*inner.points[:, 3], *outer.points[:, 3]]
+    assert min(parts) == pytest.approx(whole.points[:, 3].min(), abs=1e-6)
+    assert max(parts) == pytest.approx(whole.points[:, 3].max(), abs=1e-6)
 
 
 def test_way_that_is_dropped_is_not_offered_again_on_either_side() -> None:
