@@ -199,13 +199,12 @@ class Settling:
         if not len(basis):
             return None
         # Where a vertex lies on a vertex the contact that is kept decides how others part.
-        beside = around.together[:, kept].any(axis=1)
+        beside = np.asarray(around.together[:, kept].any(axis=1))
         left = [k for k in range(len(around.pairs)) if k not in kept and not beside[k]]
-        rates = np.abs(around.gradients[left] @ basis.T)
-        still = np.asarray(rates.max(axis=1) < _RATE)
-        opening = [k for k, rests in zip(left, still, strict=True) if not rests]
+        rates = np.abs(around.gradients @ basis.T).max(axis=1)
+        opening = [k for k in left if rates[k] >= _RATE]
         # What stays in touch must leave the end of its edge, what is kept must not.
-        passing = [k for k, rests in zip(left, still, strict=True) if rests]
+        passing = [k for k in left if rates[k] < _RATE]
         sliding = [k for k in kept if around.at_end[k]]
         rising = [*rising, *around.gradients[opening], *around.inward[sliding]]
         wanted = np.array([*rising, *-around.inward[passing]]) @ basis.T
