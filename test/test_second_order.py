@@ -272,6 +272,33 @@ def test_energy_is_least_wherever_two_contacts_are_said_to_hold() -> None:
                 assert lowest_nearby(found.system, z, formation_of_two.array, 2e-3) > 0.0
 
 
+def test_instant_of_second_order_between_two_segments_of_first_order_is_certified() -> None:
+    """Two of four contacts stop pressing at once, and one of them presses again at once."""
+    found = explored('h122')
+    system, names = found.system, found.problem.hand.joint_names
+
+    def grasp(z: FloatArray) -> Grasp:
+        pose = tuple(system.object_poses(z[None])[0].round(9))
+        return Grasp(pose, tuple(z[3:].round(9)))
+
+    met = [
+        (piece, other)
+        for piece in found.pieces()
+        for _, other in found.roadmap.settling.beside(piece)
+        if piece.dimension == 1 and other.stability is Stability.FORCE_CLOSURE
+    ]
+    assert met
+    for piece, other in met:
+        points = configurations(other)
+        start, goal = grasp(piece.points[len(piece.points) // 2]), grasp(points[len(points) // 2])
+        joints = dict(zip(names, goal.joints, strict=True))
+        problem = replace(found.problem, start=start, goal=Goal(goal.object_pose, joints))
+        result = plan(problem)
+        assert result.solved, result.message
+        report = verify_plan(problem, result)
+        assert report.ok, report.failures
+
+
 def test_example_problem_has_the_same_plan_with_and_without() -> None:
     problem = load_problem(FOLDER / 'h122.yaml')
     with_it, without = (plan(problem, PlanOptions(second_order=s)) for s in (True, False))
