@@ -185,7 +185,7 @@ class _Planning:
 
     def _search_goals(
         self, start: FloatArray, goals: Sequence[FloatArray | GoalTest]
-    ) -> list[Leg] | None:
+    ) -> Sequence[Leg] | None:
         found = (self._search(start, goal) for goal in goals)
         return next((legs for legs in found if legs is not None), None)
 
