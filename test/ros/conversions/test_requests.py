@@ -23,6 +23,7 @@ from cfplan_core import (
     Preference,
     Problem,
     Tolerance,
+    TrajectoryOptions,
     load_problem,
     plan,
 )
@@ -308,6 +309,7 @@ EVERYTHING = PlanOptions(
     stay_within=((-0.1, 0.0), (0.1, 0.0), (0.0, 0.1)),
     prefer=Preference.ROBUST,
     alternatives=3,
+    trajectory=TrajectoryOptions(2.0, 0.1, 0.02, 0.5),
 )
 
 
