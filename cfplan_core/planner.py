@@ -12,6 +12,7 @@ from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Problem
+from cfplan_core.planning.expedition import Expedition
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.pieces import Region
@@ -19,6 +20,9 @@ from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.search import Search, Tree
 from cfplan_core.trajectory.frames import Frames, build_frames, overloaded_legs
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
+
+# Hands with more joints are planned for by drives rather than piece by piece.
+_MOST_JOINTS_SEARCHED = 2
 
 
 @dataclass(frozen=True)
@@ -101,7 +105,7 @@ class _Planning:
         self.system = ContactSystem(problem)
         self.model = FrictionlessModel(self.system.load)
         self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
-        self.search: Search | None = None
+        self.search: Search | Expedition | None = None
 
     def run(self) -> PlanResult:
         examined = examine_problem(self.system, self.model)
@@ -139,6 +143,11 @@ class _Planning:
         are blocked, ways through regions forgotten, and the search is run again on the roadmap
         that is there.
         """
+        if self.system.joint_count > _MOST_JOINTS_SEARCHED:
+            self.search = Expedition(self.roadmap, start, goal, self._grown)
+            if not self.search.run():
+                raise _BudgetExhaustedError(f'no path found by {self.search.drives} drives')
+            return build_frames(self.system, self.model, self.search.path())
         blocked: frozenset[int] = frozenset()
         while True:
             self.search = Search(self.roadmap, start, goal, blocked, self._grown)

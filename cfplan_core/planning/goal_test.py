@@ -6,7 +6,7 @@ import numpy as np
 
 from cfplan_core.contact.elements import parse_contact
 from cfplan_core.contact.gaps import gap_gradients
-from cfplan_core.contact.system import ContactSystem
+from cfplan_core.contact.system import ContactSystem, IntArray
 from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Goal
@@ -80,6 +80,10 @@ class GoalTest:
     def may_hold(self, piece: Piece) -> bool:
         """Tell whether a piece has the contacts wanted."""
         return self._pairs <= set(piece.formation.pairs)
+
+    def has_contacts(self, pairs: IntArray) -> bool:
+        """Tell whether the contacts wanted are among pairs, shape (k,)."""
+        return self._pairs <= set(pairs.tolist())
 
     def fits(self, z: FloatArray) -> bool:
         """Tell whether a configuration has the coordinates wanted, within their tolerances."""

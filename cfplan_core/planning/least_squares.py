@@ -37,7 +37,7 @@ def constrained_minimum(
     short = bounds - rows @ free
     size = np.maximum(np.sqrt(np.abs(np.diagonal(dual))), _TOLERANCE)
     active: list[int] = []
-    multipliers = np.zeros(0)
+    multipliers: FloatArray = np.zeros(0)
     for _ in range(4 * len(rows) + 20):
         violation = short.copy()
         if active:
@@ -50,11 +50,12 @@ def constrained_minimum(
         active.append(worst)
         while active:
             block = dual[np.ix_(active, active)]
-            found = np.linalg.lstsq(block, short[active], rcond=1e-12)[0]
-            if np.abs(block @ found - short[active]).max() > 1e-7:
+            multipliers = np.asarray(np.linalg.lstsq(block, short[active], rcond=1e-12)[0])
+            if np.abs(block @ multipliers - short[active]).max() > 1e-7:
                 return None
-            if (found >= -_TOLERANCE).all():
+            if (multipliers >= -_TOLERANCE).all():
                 break
-            active.pop(int(np.argmin(found)))
-        multipliers = found if active else np.zeros(0)
+            active.pop(int(np.argmin(multipliers)))
+        if not active:
+            multipliers = np.zeros(0)
     return None

@@ -58,9 +58,7 @@ class Limits:
 
     def with_rows(self, rows: FloatArray, bounds: FloatArray) -> Limits:
         """Add further inequalities."""
-        return Limits(
-            np.concatenate([self.rows, rows]), np.concatenate([self.bounds, bounds])
-        )
+        return Limits(np.concatenate([self.rows, rows]), np.concatenate([self.bounds, bounds]))
 
 
 def displacement(
@@ -179,9 +177,7 @@ class Helm:
         below, above = z[3:] - system.lower, system.upper - z[3:]
         low, high = np.flatnonzero(below < 2.0 * REACH), np.flatnonzero(above < 2.0 * REACH)
         bounds = np.concatenate([below[low], above[high]])
-        return Limits(
-            np.concatenate([unit[low], -unit[high]]), -0.9 * np.maximum(bounds, 0.0)
-        )
+        return Limits(np.concatenate([unit[low], -unit[high]]), -0.9 * np.maximum(bounds, 0.0))
 
     def _near_gaps(
         self, formation: Formation, drive: Drive, z: FloatArray, ignored: frozenset[int]
@@ -229,4 +225,3 @@ class Helm:
         points = np.concatenate([z[None], z + _DIFFERENCE * basis])
         margins = self._tracer.margins(formation, points).stable
         return float(margins[0]), (margins[1:] - margins[0]) / _DIFFERENCE @ basis
-

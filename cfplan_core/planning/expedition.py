@@ -1,0 +1,316 @@
+"""Search in contact formations of any dimension: two trees of configurations, pushed on purpose.
+
+Hands with many joints have contact formations of many dimensions, of which no complete picture can
+be drawn. Two trees grow from the start and the goal. In turns a tree is pushed from one of its
+configurations along a drive: towards the other tree, towards its object's pose alone, to put a
+free link onto the object, to move single joints or whole fingers, to hold the object better. As
+motion is reversible the trees join where a push from one reaches a configuration of the other.
+
+The choice of drives is drawn from a generator with a fixed seed: same problem, same answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from cfplan_core.contact.detection import touching
+from cfplan_core.contact.formation import Formation
+from cfplan_core.contact.system import IntArray
+from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.contact_model import Stability
+from cfplan_core.planning.drives import Drive, ToConfiguration
+from cfplan_core.planning.goal_test import GoalTest
+from cfplan_core.planning.milestones import Growth, Milestone, Stretch
+from cfplan_core.planning.pieces import Region
+from cfplan_core.planning.placing import placements
+from cfplan_core.planning.pushing import Pusher
+from cfplan_core.planning.roadmap import Roadmap
+from cfplan_core.planning.search import Leg, Node, Tree
+from cfplan_core.planning.tracing import classify
+from cfplan_core.planning.transitions import TOUCH, surroundings
+
+# How much a joint counts beside the object's pose where distances are compared.
+_JOINT = 0.1
+# How much farther away a configuration counts for every push from it.
+_TRIED = 0.15
+# Joined if a push ends this near to a configuration of the other tree.
+_MET = 1e-7
+# Configurations of the other tree that a new one is pushed towards.
+_NEAREST = 1
+
+
+class Expedition:
+    """Two trees of configurations; only the initial one if the goal is not a whole grasp.
+
+    Attributes:
+        trees: The initial and the goal tree of contact formations.
+        meeting: Index of the piece where they joined or the goal was found, or None.
+        drives: How many drives were pushed along.
+    """
+
+    def __init__(
+        self,
+        roadmap: Roadmap,
+        start: FloatArray,
+        goal: FloatArray | GoalTest,
+        grown: Callable[[int, int], None] = lambda initial, goal: None,
+        seed: int = 0,
+        most_drives: int = 20000,
+    ) -> None:
+        """Root the trees.
+
+        Args:
+            roadmap: Counts what is found.
+            start: Stable configuration, shape (3 + n,).
+            goal: Stable configuration, shape (3 + n,), or a test for one.
+            grown: Called with the trees' numbers of nodes before one is added; may raise.
+            seed: Of the generator that drives are drawn from.
+            most_drives: After so many the search gives up.
+        """
+        self._roadmap = roadmap
+        self._system = roadmap.system
+        self._grown = grown
+        self._rng = np.random.default_rng(seed)
+        self._most_drives = most_drives
+        self.drives = 0
+        self.meeting: int | None = None
+        self._test = goal if isinstance(goal, GoalTest) else None
+        self._pusher = Pusher(roadmap.tracer, roadmap.failures, self._region_of)
+        roots = [start] if isinstance(goal, GoalTest) else [start, goal]
+        self._growths = [Growth() for _ in roots]
+        for growth, root in zip(self._growths, roots, strict=True):
+            growth.add(Milestone(root, surroundings(self._system, root), None, ()))
+        self._met: tuple[Milestone, Milestone] | None = None
+        self._scale = np.ones(self._system.dof)
+        self._scale[3:] = _JOINT
+
+    @property
+    def trees(self) -> tuple[Tree, Tree]:
+        """The CF-trees, for pictures and statistics."""
+        trees = [_cf_tree(growth) for growth in self._growths]
+        if len(trees) < 2:
+            trees.append(Tree(trees[0].root))
+        if self._met is not None:
+            last = self._met[0].stretches[-1].region if self._met[0].stretches else None
+            if last is not None and last.index not in trees[1].index_of:
+                trees[1].add(Node(last, 0 if trees[1].nodes else None, self._met[0].z, 1))
+        return trees[0], trees[1]
+
+    def run(self) -> bool:
+        """Grow until the trees meet (true) or the drives are used up (false)."""
+        if len(self._growths) > 1 and self._arrived(0, self._growths[0].milestones[0]):
+            return True
+        while self._met is None and self.drives < self._most_drives:
+            side = self.drives % len(self._growths)
+            growth = self._growths[side]
+            begin, drive, on_edges = self._choose(side)
+            begin.tries += 1
+            for reached in self._push(begin, drive, on_edges):
+                self._add(side, reached)
+                if self._arrived(side, reached):
+                    return True
+            newest = growth.milestones[-1]
+            if newest is not begin and self._connect(side, newest):
+                return True
+        return self._met is not None
+
+    def _push(self, begin: Milestone, drive: Drive, on_edges: bool) -> Iterator[Milestone]:
+        self.drives += 1
+        yield from self._pusher.push(begin, drive, on_edges)
+        self._roadmap.attempts = self._pusher.attempts
+
+    def _add(self, side: int, reached: Milestone) -> None:
+        counts = [len(growth.milestones) for growth in self._growths] + [0]
+        counts[side] += 1
+        self._grown(counts[0], counts[1])
+        self._growths[side].add(reached)
+
+    def _arrived(self, side: int, reached: Milestone) -> bool:
+        """Tell whether a configuration fulfils the goal or is one of the other tree."""
+        if self._test is not None:
+            if self._test.fits(reached.z) and self._test.has_contacts(reached.around.pairs):
+                self._met = (reached, reached)
+                return True
+            return False
+        other = self._growths[1 - side]
+        off = np.abs(other.table - reached.z).max(axis=1)
+        nearest = int(np.argmin(off))
+        if off[nearest] > _MET:
+            return False
+        pair = (reached, other.milestones[nearest])
+        self._met = pair if side == 0 else (pair[1], pair[0])
+        return True
+
+    def _connect(self, side: int, new: Milestone) -> bool:
+        """Push from a new configuration to the nearest of the other tree, all the way."""
+        if len(self._growths) < 2:
+            return False
+        other = self._growths[1 - side]
+        off = np.linalg.norm((other.table - new.z) * self._scale, axis=1)
+        for index in np.argsort(off, kind='stable')[:_NEAREST]:
+            target = other.milestones[int(index)]
+            for on_edges in (True, False):
+                for reached in self._push(new, self._towards(target), on_edges):
+                    self._add(side, reached)
+                    if self._arrived(side, reached):
+                        return True
+        return False
+
+    def _towards(self, target: Milestone) -> ToConfiguration:
+        weights = np.ones(self._system.dof)
+        weights[3:] = 0.3
+        return ToConfiguration(
+            target.z, weights, frozenset(int(pair) for pair in target.around.pairs)
+        )
+
+    def _choose(self, side: int) -> tuple[Milestone, Drive, bool]:
+        """Draw a configuration of a tree and a drive from it."""
+        rng = self._rng
+        growth = self._growths[side]
+        on_edges = bool(rng.random() < 0.5)
+        free = None if rng.random() < 0.5 else frozenset[int]()
+        kind = rng.random()
+        system = self._system
+        if kind < 0.35:
+            if len(self._growths) > 1:
+                other = self._growths[1 - side]
+                number = 0 if rng.random() < 0.5 else int(rng.integers(len(other.milestones)))
+                target = other.milestones[number]
+                begin = self._nearest(growth, target.z, self._scale)
+                if kind < 0.15:
+                    return begin, self._towards(target), on_edges
+                wanted = target.z
+            else:
+                assert self._test is not None
+                wanted = np.zeros(system.dof)
+                wanted[self._test.columns] = self._test.wanted
+                weights = np.zeros(system.dof)
+                weights[self._test.columns] = 1.0
+                begin = self._nearest(growth, wanted, weights * self._scale)
+                return begin, ToConfiguration(wanted, weights, free), on_edges
+            return begin, ToConfiguration(wanted, _pose_weights(system.dof), free), on_edges
+        begin = self._promising(side)
+        if kind < 0.5:
+            wanted = begin.z.copy()
+            wanted[:3] += rng.normal(size=3) * [0.3, 0.3, 0.5]
+            return begin, ToConfiguration(wanted, _pose_weights(system.dof), free), on_edges
+        if kind < 0.8:
+            drive = placements(system, begin, rng)
+            if drive is not None:
+                return begin, drive, True
+        wanted = begin.z.copy()
+        fingers = self._fingers()
+        columns = fingers[int(rng.integers(len(fingers)))]
+        if rng.random() < 0.4:
+            columns = columns[[int(rng.integers(len(columns)))]]
+        wanted[columns] += rng.normal(size=len(columns)) * 0.6
+        wanted[3:] = np.clip(wanted[3:], system.lower, system.upper)
+        weights = np.zeros(system.dof)
+        weights[columns] = 1.0
+        if rng.random() < 0.5:
+            weights[:3] = 1.0
+        return begin, ToConfiguration(wanted, weights, free), on_edges
+
+    def _fingers(self) -> list[IntArray]:
+        """Columns of z of each finger's joints."""
+        found, first = [], 3
+        for finger in self._system.problem.hand.fingers:
+            found.append(np.arange(first, first + len(finger.joints)))
+            first += len(finger.joints)
+        return found
+
+    def _nearest(self, growth: Growth, wanted: FloatArray, scale: FloatArray) -> Milestone:
+        off = np.linalg.norm((growth.table - wanted) * scale, axis=1)
+        tries = np.array([milestone.tries for milestone in growth.milestones])
+        return growth.milestones[int(np.argmin(off + _TRIED * tries))]
+
+    def _promising(self, side: int) -> Milestone:
+        """Draw a configuration, rather one near the other tree's root and seldom tried."""
+        growth = self._growths[side]
+        if len(self._growths) > 1:
+            wanted, scale = self._growths[1 - side].table[0], self._scale
+        else:
+            assert self._test is not None
+            wanted, scale = np.zeros(self._system.dof), np.zeros(self._system.dof)
+            wanted[self._test.columns] = self._test.wanted
+            scale[self._test.columns] = 1.0
+        off = np.linalg.norm((growth.table - wanted) * scale, axis=1)
+        tries = np.array([milestone.tries for milestone in growth.milestones])
+        order = np.argsort(off + _TRIED * tries, kind='stable')
+        rank = min(int(self._rng.exponential(0.15 * len(order))), len(order) - 1)
+        return growth.milestones[int(order[rank])]
+
+    def _region_of(
+        self, known: list[Region], formation: Formation, stability: Stability
+    ) -> Region:
+        for region in known:
+            if region.formation == formation and region.stability is stability:
+                return region
+        roadmap = self._roadmap
+        anchor = np.zeros((1, self._system.dof))
+        region = Region(len(roadmap.pieces), formation, stability, 2, anchor, (), [])
+        roadmap.pieces.append(region)
+        known.append(region)
+        return region
+
+    def path(self) -> list[Leg]:
+        """Legs from start to goal; only after `run` returned true."""
+        assert self._met is not None
+        pieces: list[tuple[Stretch, FloatArray]] = []
+        for milestone in Growth.chain(self._met[0])[1:]:
+            pieces += [(stretch, stretch.points) for stretch in milestone.stretches]
+        if self._test is None:
+            for milestone in Growth.chain(self._met[1])[:0:-1]:
+                pieces += [(s, s.points[::-1]) for s in reversed(milestone.stretches)]
+        return self._legs(pieces)
+
+    def _legs(self, pieces: list[tuple[Stretch, FloatArray]]) -> list[Leg]:
+        """Make successive motions share their point, and one of those where nothing happens."""
+        if not pieces:
+            root = self._growths[0].milestones[0]
+            formation = Formation(tuple(int(pair) for pair in root.around.pairs))
+            stability = classify(self._roadmap.model.margins(root.around.gradients[None]))
+            region = self._region_of(root.entered, formation, stability)
+            return [Leg(region.index, formation, stability, root.z[None])]
+        legs: list[Leg] = []
+        for stretch, points in pieces:
+            if legs:
+                before = legs[-1]
+                points = np.concatenate([before.points[-1:], points[1:]])
+                alike = before.formation == stretch.formation
+                alike = alike and before.stability is stretch.stability
+                touched = tuple(touching(self._system, points[0], TOUCH).tolist())
+                if alike and touched == stretch.formation.pairs:
+                    points = np.concatenate([before.points, points[1:]])
+                    legs.pop()
+            region = stretch.region
+            legs.append(Leg(region.index, stretch.formation, stretch.stability, points))
+        return legs
+
+
+def _pose_weights(dof: int) -> FloatArray:
+    """Weights, shape (3 + n,), of the object's pose alone."""
+    weights = np.zeros(dof)
+    weights[:3] = 1.0
+    return weights
+
+
+def _cf_tree(growth: Growth) -> Tree:
+    """Regions of a tree in the order of discovery, each below that it was entered from."""
+    root = growth.milestones[0]
+    tree = Tree(root.z)
+    for milestone in growth.milestones[1:]:
+        assert milestone.parent is not None
+        above = milestone.parent.stretches[-1].region.index if milestone.parent.stretches else None
+        for stretch in milestone.stretches:
+            if stretch.region.index not in tree.index_of:
+                parent = tree.index_of.get(above) if above is not None else None
+                if parent is None and tree.nodes:
+                    parent = 0
+                depth = 0 if parent is None else tree.nodes[parent].depth + 1
+                entry = None if parent is None else stretch.points[0]
+                tree.add(Node(stretch.region, parent, entry, depth))
+            above = stretch.region.index
+    return tree

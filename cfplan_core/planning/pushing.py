@@ -1,0 +1,119 @@
+"""Push a configuration along a drive, through as many contact formations as it takes.
+
+Where an event ends a motion, the drive is projected onto the ways out of the configuration
+(`cfplan_core.planning.branching`) and goes on along the one that serves it best, so that contacts
+are made and broken as the drive needs.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from cfplan_core.contact.formation import Formation
+from cfplan_core.contact.gaps import gap_gradients
+from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.contact_model import Stability
+from cfplan_core.planning.branching import Branch, branches
+from cfplan_core.planning.drives import Drive
+from cfplan_core.planning.events import EventKind
+from cfplan_core.planning.milestones import Milestone, Stretch
+from cfplan_core.planning.pieces import SAME, Region
+from cfplan_core.planning.stability_classes import split_by_class
+from cfplan_core.planning.steering import Helm
+from cfplan_core.planning.tracing import Tracer
+from cfplan_core.planning.transitions import surroundings
+
+# Ways out of a configuration that are tried, the best first.
+_WAYS = 2
+_MOST_EVENTS = 12
+_LONGEST = 12.0
+# A motion counts if it brings at least this part of what is missing.
+_PROGRESS = 1e-3
+
+# Gives the region, known at a configuration or new, that a stretch leads into from there.
+Classifier = Callable[[list[Region], Formation, Stability], Region]
+
+
+class Pusher:
+    """Pushes along drives, under one tracer."""
+
+    def __init__(self, tracer: Tracer, failures: Counter[str], region_of: Classifier) -> None:
+        """Prepare.
+
+        Args:
+            tracer: Follows motions.
+            failures: Counts why ways out are not taken.
+            region_of: Names the connected piece that a motion lies in.
+        """
+        self._tracer = tracer
+        self._helm = Helm(tracer)
+        self._failures = failures
+        self._region_of = region_of
+        self.attempts = 0
+        joints = tracer.system.problem.hand.joints
+        unit = tracer.system.force_unit * tracer.system.size
+        self._effort = np.array([joint.effort_limit for joint in joints]) / unit
+
+    def push(
+        self, begin: Milestone, drive: Drive, keep_on_edges: bool, most: int = _MOST_EVENTS
+    ) -> Iterator[Milestone]:
+        """Push from a milestone; yields the milestones that are reached, one after the other."""
+        at = begin
+        for _ in range(most):
+            rest = drive.remaining(at.z)
+            if rest < SAME:
+                return
+            reached = self._step(at, drive, keep_on_edges, rest)
+            if reached is None:
+                return
+            yield reached
+            at = reached
+
+    def _step(
+        self, at: Milestone, drive: Drive, keep_on_edges: bool, rest: float
+    ) -> Milestone | None:
+        tracer = self._tracer
+        ways = branches(at.around, tracer, self._helm, drive, keep_on_edges, self._failures)
+        for branch in [way for way in ways if way.gain > _PROGRESS * min(rest, 0.3)][:_WAYS]:
+            reached = self._follow(at, branch, drive, keep_on_edges)
+            if reached is not None and drive.remaining(reached.z) < rest * (1.0 - _PROGRESS):
+                return reached
+        return None
+
+    def _follow(
+        self, at: Milestone, branch: Branch, drive: Drive, keep_on_edges: bool
+    ) -> Milestone | None:
+        way = branch.departure
+        self.attempts += 1
+        steer = self._helm.steering(way.formation, drive, keep_on_edges, heading=branch.ahead)
+        trace = self._tracer.follow(way.formation, at.z, steer, way.departing, longest=_LONGEST)
+        points = self._strong(way.formation, trace.points)
+        if np.abs(points[-1] - at.z).max() < SAME:
+            self._failures[f'at once, {trace.kind.value}'] += 1
+            return None
+        if trace.kind is not EventKind.TARGET:
+            self._failures[trace.kind.value] += 1
+        stretches = []
+        known = at.entered
+        for stability, part in split_by_class(self._tracer, way.formation, points):
+            region = self._region_of(known, way.formation, stability)
+            stretches.append(Stretch(way.formation, stability, part, region))
+            known = [region]
+        around = surroundings(self._tracer.system, points[-1])
+        return Milestone(points[-1], around, at, tuple(stretches), known)
+
+    def _strong(self, formation: Formation, points: FloatArray) -> FloatArray:
+        """Points up to where a joint would exceed its effort limit."""
+        system = self._tracer.system
+        weight = system.link_weight_torques(points)
+        gradients = gap_gradients(system, system.place(points), formation.array)
+        holds = self._tracer.model.holds_within(
+            gradients, -self._effort - weight, self._effort - weight
+        )
+        if holds.all():
+            return points
+        self._failures['a joint would exceed its effort limit'] += 1
+        return points[: max(1, int(np.argmin(holds)))]
