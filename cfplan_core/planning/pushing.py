@@ -12,17 +12,18 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from cfplan_core.contact.detection import touching
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.gaps import gap_gradients
+from cfplan_core.contact.gaps import gap_gradients, gaps
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.branching import Branch, branches
 from cfplan_core.planning.drives import Drive
-from cfplan_core.planning.events import EventKind
+from cfplan_core.planning.events import OPEN_EVENTS, EventKind
 from cfplan_core.planning.milestones import Milestone, Stretch
 from cfplan_core.planning.pieces import SAME, Region
 from cfplan_core.planning.stability_classes import split_by_class
-from cfplan_core.planning.steering import Helm
+from cfplan_core.planning.steering import COMFORT, Helm
 from cfplan_core.planning.tracing import Tracer
 from cfplan_core.planning.transitions import surroundings
 
@@ -30,6 +31,12 @@ from cfplan_core.planning.transitions import surroundings
 _WAYS = 2
 _MOST_EVENTS = 12
 _LONGEST = 12.0
+# Contacts nearer than this, in m, that are not made are not told apart from those that are, but
+# for those that open or close within so many radians and object sizes of an end.
+_DISTINCT = 3e-6
+_BESIDE = 0.02
+# A contact that opens and closes again does so on a motion at least as long as this.
+_EXCURSION = 0.15
 # A motion counts if it brings at least this part of what is missing.
 _PROGRESS = 1e-3
 
@@ -90,9 +97,18 @@ class Pusher:
         self.attempts += 1
         steer = self._helm.steering(way.formation, drive, keep_on_edges, heading=branch.ahead)
         trace = self._tracer.follow(way.formation, at.z, steer, way.departing, longest=_LONGEST)
-        points = self._strong(way.formation, trace.points)
+        points = trace.points
+        if trace.kind is EventKind.UNSTABLE:
+            points = self._comfortable(way.formation, points)
+        points = self._strong(way.formation, points)
+        points = self._distinct(at, way.formation, points, trace.kind in OPEN_EVENTS)
         if np.abs(points[-1] - at.z).max() < SAME:
             self._failures[f'at once, {trace.kind.value}'] += 1
+            return None
+        around = surroundings(self._tracer.system, points[-1])
+        both = set(at.around.pairs.tolist()) & set(around.pairs.tolist())
+        if both - set(way.formation.pairs) and np.abs(points - at.z).max() < _EXCURSION:
+            self._failures['a contact would open for an instant only'] += 1
             return None
         if trace.kind is not EventKind.TARGET:
             self._failures[trace.kind.value] += 1
@@ -102,8 +118,40 @@ class Pusher:
             region = self._region_of(known, way.formation, stability)
             stretches.append(Stretch(way.formation, stability, part, region))
             known = [region]
-        around = surroundings(self._tracer.system, points[-1])
         return Milestone(points[-1], around, at, tuple(stretches), known)
+
+    def _comfortable(self, formation: Formation, points: FloatArray) -> FloatArray:
+        """Points of a motion that ran out of stability up to where there was plenty left."""
+        margins = self._tracer.margins(formation, points).stable
+        plenty = np.flatnonzero(margins > 0.5 * min(float(margins[0]), COMFORT))
+        return points[: int(plenty[-1]) + 1] if len(plenty) else points[:1]
+
+    def _distinct(
+        self, at: Milestone, formation: Formation, points: FloatArray, event: bool
+    ) -> FloatArray:
+        """Points up to where another contact nearly touches without being made.
+
+        Near the start contacts of the milestone open, near an event those of the event close.
+        """
+        system = self._tracer.system
+        near = _DISTINCT / system.size
+        placed = system.place(points)
+        contacts = slice(0, system.contact_count)
+        gap, offset = gaps(system, placed, contacts)
+        length = system.pair_length[contacts]
+        doubtful = (np.abs(gap) < near) & (offset > -near) & (offset < length + near)
+        doubtful[:, formation.array] = False
+        away = np.abs(points - points[0]).max(axis=1)
+        doubtful[np.ix_(away < _BESIDE, at.around.pairs)] = False
+        if event:
+            ahead = np.abs(points - points[-1]).max(axis=1) < _BESIDE
+            doubtful[np.ix_(ahead, touching(system, points[-1], near))] = False
+        for index in np.flatnonzero(doubtful.any(axis=1)):
+            others = set(touching(system, points[index], near).tolist())
+            if (others - set(formation.pairs)) & set(np.flatnonzero(doubtful[index]).tolist()):
+                self._failures['a contact would nearly be made'] += 1
+                return points[: max(1, int(index))]
+        return points
 
     def _strong(self, formation: Formation, points: FloatArray) -> FloatArray:
         """Points up to where a joint would exceed its effort limit."""

@@ -41,6 +41,9 @@ _DIFFERENCE = 1e-6
 # A drive ends where less than this part of what it asks for is allowed.
 _BLOCKED = 0.03
 _ARRIVED = 1e-10
+# and where a stretch brings less than this part of what is missing.
+_LEAST_PROGRESS = 0.002
+_PLACES = np.array([0.0, 0.125, 0.25, 0.5, 0.75, 1.0])
 _DAMPING = 1e-9
 
 
@@ -125,23 +128,33 @@ class Helm:
             heading: First displacement, if it is known already.
         """
         first = heading
+        least = np.inf
 
         def steer(z: FloatArray, basis: FloatArray) -> FloatArray | None:
-            nonlocal first
+            nonlocal first, least
             self._tracer.checkpoint()
+            rest = drive.remaining(z)
+            if rest > (1.0 - _LEAST_PROGRESS) * least:
+                return None
+            least = rest
             if first is not None:
                 ahead, first = first, None
-                return ahead
+                return self._steady(formation, z, ahead)
             limits = self.limits(formation, drive, z, basis, keep_on_edges)
             found = displacement(drive, z, basis, limits)
             if found is None or np.abs(found).max() <= _ARRIVED:
                 return None
-            rest = drive.remaining(z)
             if rest > 1e-4 and gained(drive, z, found) < _BLOCKED * min(rest, 0.1):
                 return None
-            return found
+            return self._steady(formation, z, found)
 
         return steer
+
+    def _steady(self, formation: Formation, z: FloatArray, ahead: FloatArray) -> FloatArray:
+        """Shorten a displacement so that the margin of stability holds all along it."""
+        margins = self._tracer.margins(formation, z + _PLACES[:, None] * ahead).stable
+        poor = margins[1:] < 0.5 * min(float(margins[0]), COMFORT)
+        return ahead * float(_PLACES[max(1, int(np.argmax(poor)))]) if poor.any() else ahead
 
     def limits(
         self,
@@ -188,7 +201,9 @@ class Helm:
         first = 0 if drive.closing is not None else system.contact_count
         gap, offset = (values[0] for values in gaps(system, placed, slice(first, None)))
         length = system.pair_length[first:]
-        near = (gap > 0.0) & (gap < _NEAR) & (offset > -_BEYOND) & (offset < length + _BEYOND)
+        # Links may touch, and must not come nearer; contacts that touch are judged elsewhere.
+        lowest = np.where(np.arange(first, first + len(gap)) < system.contact_count, 0.0, -1e-7)
+        near = (gap > lowest) & (gap < _NEAR) & (offset > -_BEYOND) & (offset < length + _BEYOND)
         pairs = np.flatnonzero(near)
         pairs = pairs[np.argsort(gap[pairs], kind='stable')]
         open_gap = gap[pairs]
@@ -196,7 +211,7 @@ class Helm:
         skipped = {*formation.pairs, *(drive.closing or ()), *ignored}
         wanted = np.array([int(pair) not in skipped for pair in pairs], dtype=bool)
         pairs, open_gap = pairs[wanted][:_MOST_GAPS], open_gap[wanted][:_MOST_GAPS]
-        return Limits(gap_gradients(system, placed, pairs)[0], -_USED * open_gap)
+        return Limits(gap_gradients(system, placed, pairs)[0], -_USED * np.maximum(open_gap, 0.0))
 
     def _edges(self, formation: Formation, z: FloatArray) -> Limits:
         """Keep contacts on their edges, and edges beside touching vertices off them."""
