@@ -11,7 +11,8 @@ The choice of drives is drawn from a generator with a fixed seed: same problem, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -39,6 +40,14 @@ _TRIED = 0.15
 _MET = 1e-7
 # Configurations of the other tree that a new one is pushed towards.
 _NEAREST = 1
+
+
+# Detours of a path that are looked for a shorter way.
+_MOST_SHORTCUTS = 60
+
+Motion = Sequence[tuple[Stretch, FloatArray]]
+# A configuration of a path, and the motion that leads to it from the one before.
+Stop = tuple[Milestone, Motion]
 
 
 class Expedition:
@@ -151,11 +160,11 @@ class Expedition:
         off = np.linalg.norm((other.table - new.z) * self._scale, axis=1)
         for index in np.argsort(off, kind='stable')[:_NEAREST]:
             target = other.milestones[int(index)]
-            for on_edges in (True, False):
-                for reached in self._push(new, self._towards(target), on_edges):
-                    self._add(side, reached)
-                    if self._arrived(side, reached):
-                        return True
+            on_edges = bool(self._rng.random() < 0.5)
+            for reached in self._push(new, self._towards(target), on_edges):
+                self._add(side, reached)
+                if self._arrived(side, reached):
+                    return True
         return False
 
     def _towards(self, target: Milestone) -> ToConfiguration:
@@ -194,7 +203,10 @@ class Expedition:
         begin = self._promising(side)
         if kind < 0.5:
             wanted = begin.z.copy()
-            wanted[:3] += rng.normal(size=3) * [0.3, 0.3, 0.5]
+            roots = [growth.table[0] for growth in self._growths]
+            between = roots[0] + rng.random() * (roots[-1] - roots[0])
+            wanted[:3] = between[:3] + rng.normal(size=3) * [0.2, 0.2, 0.3]
+            begin = self._nearest(growth, wanted, _pose_weights(system.dof))
             return begin, ToConfiguration(wanted, _pose_weights(system.dof), free), on_edges
         if kind < 0.8:
             drive = placements(system, begin, rng)
@@ -258,13 +270,39 @@ class Expedition:
     def path(self) -> list[Leg]:
         """Legs from start to goal; only after `run` returned true."""
         assert self._met is not None
-        pieces: list[tuple[Stretch, FloatArray]] = []
-        for milestone in Growth.chain(self._met[0])[1:]:
-            pieces += [(stretch, stretch.points) for stretch in milestone.stretches]
+        initial = Growth.chain(self._met[0])
+        stops: list[Stop] = [(initial[0], ())]
+        stops += [(stop, _forwards(stop)) for stop in initial[1:]]
         if self._test is None:
-            for milestone in Growth.chain(self._met[1])[:0:-1]:
-                pieces += [(s, s.points[::-1]) for s in reversed(milestone.stretches)]
+            goal = Growth.chain(self._met[1])[::-1]
+            for before, stop in pairwise(goal):
+                stops.append((stop, _backwards(before)))
+        pieces = [piece for _, motion in self._shortened(stops) for piece in motion]
         return self._legs(pieces)
+
+    def _shortened(self, stops: list[Stop]) -> list[Stop]:
+        """Replace detours by pushes from a stop of a path straight to a later one."""
+        pushes = 0
+        first = 0
+        while first < len(stops) - 2:
+            for last in range(len(stops) - 1, first + 1, -1):
+                if pushes == _MOST_SHORTCUTS:
+                    return stops
+                way = stops[first + 1 : last + 1]
+                begin, end = stops[first][0], stops[last][0]
+                if _length(way) < 1.2 * float(np.abs(end.z - begin.z).max()):
+                    continue
+                pushes += 1
+                *inner, arrived = [begin, *self._pusher.push(begin, self._towards(end), True)]
+                if not inner or np.abs(arrived.z - end.z).max() > _MET:
+                    continue
+                found: list[Stop] = [(stop, _forwards(stop)) for stop in (*inner[1:], arrived)]
+                found[-1] = (end, found[-1][1])
+                if _length(found) < 0.95 * _length(way):
+                    stops = [*stops[: first + 1], *found, *stops[last + 1 :]]
+                    break
+            first += 1
+        return stops
 
     def _legs(self, pieces: list[tuple[Stretch, FloatArray]]) -> list[Leg]:
         """Make successive motions share their point, and one of those where nothing happens."""
@@ -295,6 +333,25 @@ def _pose_weights(dof: int) -> FloatArray:
     weights = np.zeros(dof)
     weights[:3] = 1.0
     return weights
+
+
+def _forwards(stop: Milestone) -> Motion:
+    """Motion to a milestone from its parent."""
+    return [(stretch, stretch.points) for stretch in stop.stretches]
+
+
+def _backwards(stop: Milestone) -> Motion:
+    """Motion from a milestone to its parent."""
+    return [(stretch, stretch.points[::-1]) for stretch in reversed(stop.stretches)]
+
+
+def _length(stops: Sequence[Stop]) -> float:
+    """Length of the motions to stops, in radians and object sizes."""
+    return sum(
+        float(np.abs(np.diff(points, axis=0)).max(axis=1).sum())
+        for _, motion in stops
+        for _, points in motion
+    )
 
 
 def _cf_tree(growth: Growth) -> Tree:

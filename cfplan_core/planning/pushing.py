@@ -37,6 +37,8 @@ _DISTINCT = 3e-6
 _BESIDE = 0.02
 # A contact that opens and closes again does so on a motion at least as long as this.
 _EXCURSION = 0.15
+# and one that makes or breaks a contact is at least as long as this.
+_HOP = 0.02
 # A motion counts if it brings at least this part of what is missing.
 _PROGRESS = 1e-3
 
@@ -106,10 +108,12 @@ class Pusher:
             self._failures[f'at once, {trace.kind.value}'] += 1
             return None
         around = surroundings(self._tracer.system, points[-1])
-        both = set(at.around.pairs.tolist()) & set(around.pairs.tolist())
-        if both - set(way.formation.pairs) and np.abs(points - at.z).max() < _EXCURSION:
-            self._failures['a contact would open for an instant only'] += 1
-            return None
+        before, after = set(at.around.pairs.tolist()), set(around.pairs.tolist())
+        extent = float(np.abs(points - at.z).max())
+        for shortest, opened in ((_EXCURSION, before & after), (_HOP, before | after)):
+            if extent < shortest and opened - set(way.formation.pairs):
+                self._failures['a contact would open for an instant only'] += 1
+                return None
         if trace.kind is not EventKind.TARGET:
             self._failures[trace.kind.value] += 1
         stretches = []
