@@ -40,6 +40,10 @@ _TRIED = 0.15
 _MET = 1e-7
 # Configurations of the other tree that a new one is pushed towards.
 _NEAREST = 1
+# Fingers are moved one by one where the object's poses differ by no more than this.
+_GAIT = 0.5
+# How much farther away a configuration counts for every body that touches in one only.
+_OTHER_BODY = 0.15
 
 
 # Detours of a path that are looked for a shorter way.
@@ -90,7 +94,8 @@ class Expedition:
         roots = [start] if isinstance(goal, GoalTest) else [start, goal]
         self._growths = [Growth() for _ in roots]
         for growth, root in zip(self._growths, roots, strict=True):
-            growth.add(Milestone(root, surroundings(self._system, root), None, ()))
+            milestone = Milestone(root, surroundings(self._system, root), None, ())
+            growth.add(milestone, self._bodies(milestone))
         self._met: tuple[Milestone, Milestone] | None = None
         self._scale = np.ones(self._system.dof)
         self._scale[3:] = _JOINT
@@ -111,8 +116,10 @@ class Expedition:
         """Grow until the trees meet (true) or the drives are used up (false)."""
         if len(self._growths) > 1 and self._arrived(0, self._growths[0].milestones[0]):
             return True
+        turn = 0
         while self._met is None and self.drives < self._most_drives:
-            side = self.drives % len(self._growths)
+            side = turn % len(self._growths)
+            turn += 1
             growth = self._growths[side]
             begin, drive, on_edges = self._choose(side)
             begin.tries += 1
@@ -134,7 +141,11 @@ class Expedition:
         counts = [len(growth.milestones) for growth in self._growths] + [0]
         counts[side] += 1
         self._grown(counts[0], counts[1])
-        self._growths[side].add(reached)
+        self._growths[side].add(reached, self._bodies(reached))
+
+    def _bodies(self, milestone: Milestone) -> tuple[int, ...]:
+        """Bodies of the hand that touch the object."""
+        return tuple(sorted(set(self._system.pair_body[milestone.around.pairs].tolist())))
 
     def _arrived(self, side: int, reached: Milestone) -> bool:
         """Tell whether a configuration fulfils the goal or is one of the other tree."""
@@ -158,14 +169,39 @@ class Expedition:
             return False
         other = self._growths[1 - side]
         off = np.linalg.norm((other.table - new.z) * self._scale, axis=1)
+        off += self._mismatch(other, self._bodies(new))
         for index in np.argsort(off, kind='stable')[:_NEAREST]:
             target = other.milestones[int(index)]
-            on_edges = bool(self._rng.random() < 0.5)
-            for reached in self._push(new, self._towards(target), on_edges):
-                self._add(side, reached)
-                if self._arrived(side, reached):
-                    return True
+            at = new
+            for drive in (self._towards(target), *self._gait(target)):
+                on_edges = bool(self._rng.random() < 0.5)
+                for reached in self._push(at, drive, on_edges):
+                    self._add(side, reached)
+                    if self._arrived(side, reached):
+                        return True
+                    at = reached
+                if float(np.abs(at.z - target.z)[:3].max()) > _GAIT:
+                    break
         return False
+
+    def _mismatch(self, growth: Growth, bodies: tuple[int, ...]) -> FloatArray:
+        """How much farther away milestones, shape (m,), count as other bodies touch there."""
+        far = np.empty(len(growth.milestones))
+        for others, indices in growth.by_bodies.items():
+            far[indices] = _OTHER_BODY * len(set(others) ^ set(bodies))
+        return far
+
+    def _gait(self, target: Milestone) -> list[Drive]:
+        """Drives to a configuration one after the other: the object, each finger, all."""
+        system = self._system
+        pairs = frozenset(int(pair) for pair in target.around.pairs)
+        drives: list[Drive] = [ToConfiguration(target.z, _pose_weights(system.dof), pairs)]
+        fingers = self._fingers()
+        for finger in self._rng.permutation(len(fingers)):
+            weights = _pose_weights(system.dof)
+            weights[fingers[int(finger)]] = 1.0
+            drives.append(ToConfiguration(target.z, weights, pairs))
+        return [*drives, self._towards(target)]
 
     def _towards(self, target: Milestone) -> ToConfiguration:
         weights = np.ones(self._system.dof)
@@ -248,11 +284,13 @@ class Expedition:
             wanted, scale = np.zeros(self._system.dof), np.zeros(self._system.dof)
             wanted[self._test.columns] = self._test.wanted
             scale[self._test.columns] = 1.0
-        off = np.linalg.norm((growth.table - wanted) * scale, axis=1)
-        tries = np.array([milestone.tries for milestone in growth.milestones])
-        order = np.argsort(off + _TRIED * tries, kind='stable')
+        kinds = list(growth.by_bodies.values())
+        chosen = kinds[int(self._rng.integers(len(kinds)))]
+        off = np.linalg.norm((growth.table[chosen] - wanted) * scale, axis=1)
+        off += _TRIED * np.array([growth.milestones[index].tries for index in chosen])
+        order = np.argsort(off, kind='stable')
         rank = min(int(self._rng.exponential(0.15 * len(order))), len(order) - 1)
-        return growth.milestones[int(order[rank])]
+        return growth.milestones[chosen[int(order[rank])]]
 
     def _region_of(
         self, known: list[Region], formation: Formation, stability: Stability

@@ -57,13 +57,16 @@ class Growth:
 
     Attributes:
         milestones: Parents before children.
+        by_bodies: Indices of milestones by the bodies of the hand that touch.
     """
 
     milestones: list[Milestone] = field(default_factory=list)
+    by_bodies: dict[tuple[int, ...], list[int]] = field(default_factory=dict)
     _table: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
-    def add(self, milestone: Milestone) -> None:
-        """Add a milestone."""
+    def add(self, milestone: Milestone, bodies: tuple[int, ...]) -> None:
+        """Add a milestone in which some bodies of the hand touch the object."""
+        self.by_bodies.setdefault(bodies, []).append(len(self.milestones))
         count = len(self.milestones)
         if count == len(self._table):
             table = np.empty((2 * count + 64, len(milestone.z)))

@@ -40,7 +40,7 @@ _EXCURSION = 0.15
 # and one that makes or breaks a contact is at least as long as this.
 _HOP = 0.02
 # A motion counts if it brings at least this part of what is missing.
-_PROGRESS = 1e-3
+_PROGRESS = 0.01
 
 # Gives the region, known at a configuration or new, that a stretch leads into from there.
 Classifier = Callable[[list[Region], Formation, Stability], Region]

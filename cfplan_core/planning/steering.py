@@ -35,6 +35,8 @@ _USED = 0.7
 _NEAR = 0.5
 _BEYOND = 0.1
 _MOST_GAPS = 24
+# Distance, in object sizes, that is kept where nothing shall touch.
+_CLEARANCE = 0.004
 # Stability margin that a steered motion keeps if it can.
 COMFORT = 0.02
 _DIFFERENCE = 1e-6
@@ -211,7 +213,10 @@ class Helm:
         skipped = {*formation.pairs, *(drive.closing or ()), *ignored}
         wanted = np.array([int(pair) not in skipped for pair in pairs], dtype=bool)
         pairs, open_gap = pairs[wanted][:_MOST_GAPS], open_gap[wanted][:_MOST_GAPS]
-        return Limits(gap_gradients(system, placed, pairs)[0], -_USED * np.maximum(open_gap, 0.0))
+        return Limits(
+            gap_gradients(system, placed, pairs)[0],
+            -_USED * np.maximum(open_gap - _CLEARANCE, 0.0),
+        )
 
     def _edges(self, formation: Formation, z: FloatArray) -> Limits:
         """Keep contacts on their edges, and edges beside touching vertices off them."""
@@ -227,7 +232,7 @@ class Helm:
         rows = np.concatenate([slide, -slide, turns[0][0], turns[1][0]])
         # Those that are used up already are for the departure to judge.
         inside = left > 1e-7
-        return Limits(rows[inside], -_USED * left[inside])
+        return Limits(rows[inside], -_USED * np.maximum(left[inside] - _CLEARANCE, 0.0))
 
     def _stability(self, formation: Formation, z: FloatArray, basis: FloatArray) -> Limits:
         margin, slope = self.margin_slope(formation, z, basis)
