@@ -30,7 +30,7 @@ demo: $(READY) ## start the node, call it with the 1991 problem, certify and dra
 	@cd $(DEMO) && ls *.mcap *.png *.gif
 
 test: $(READY) ## run the tests of core, standalone runtime and node
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 lint: $(READY) ## check style and formatting
 	$(BIN)/ruff check
@@ -51,6 +51,7 @@ bench: $(READY) ## measure planning time, memory and import time
 
 clean: ## remove .venv and everything that was built, cached or drawn by the demo
 	rm -rf .venv build install log dist *.egg-info $(DEMO)
+	rm -rf standalone/build standalone/src/*.egg-info
 	rm -rf .pytest_cache .hypothesis .mypy_cache .ruff_cache .benchmarks
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from cfplan_core.errors import Finding as Finding
     from cfplan_core.errors import InvalidPlanError as InvalidPlanError
     from cfplan_core.errors import InvalidProblemError as InvalidProblemError
+    from cfplan_core.exploration import Exploration as Exploration
+    from cfplan_core.exploration import explore as explore
     from cfplan_core.model import Finger as Finger
     from cfplan_core.model import Goal as Goal
     from cfplan_core.model import Grasp as Grasp
@@ -28,11 +30,13 @@ if TYPE_CHECKING:
     from cfplan_core.model import Problem as Problem
     from cfplan_core.model import Tolerance as Tolerance
     from cfplan_core.model.loading import load_problem as load_problem
-    from cfplan_core.planner import PlanOptions as PlanOptions
+    from cfplan_core.options import PlanOptions as PlanOptions
+    from cfplan_core.options import Preference as Preference
     from cfplan_core.planner import Progress as Progress
     from cfplan_core.planner import plan as plan
     from cfplan_core.trajectory.plan_file import read_plan as read_plan
     from cfplan_core.trajectory.plan_file import write_plan as write_plan
+    from cfplan_core.trajectory.plan_margin import plan_margin as plan_margin
     from cfplan_core.trajectory.plan_result import PlanResult as PlanResult
     from cfplan_core.trajectory.plan_result import Segment as Segment
     from cfplan_core.trajectory.plan_result import Statistics as Statistics
@@ -43,6 +47,7 @@ __version__ = '0.1.0'
 
 _HOMES = {
     'errors': ('CfplanError', 'Finding', 'InvalidPlanError', 'InvalidProblemError'),
+    'exploration': ('Exploration', 'explore'),
     'model': (
         'Finger',
         'Goal',
@@ -55,8 +60,10 @@ _HOMES = {
         'Tolerance',
     ),
     'model.loading': ('load_problem',),
-    'planner': ('PlanOptions', 'Progress', 'plan'),
+    'options': ('PlanOptions', 'Preference'),
+    'planner': ('Progress', 'plan'),
     'trajectory.plan_file': ('read_plan', 'write_plan'),
+    'trajectory.plan_margin': ('plan_margin',),
     'trajectory.plan_result': ('PlanResult', 'Segment', 'Statistics', 'Status'),
     'verification': ('verify_plan',),
 }

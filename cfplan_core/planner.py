@@ -4,44 +4,37 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from cfplan_core.contact.formation import Formation
+from cfplan_core.contact.held import HeldSystem
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.frictionless import FrictionlessModel
-from cfplan_core.model import Problem
+from cfplan_core.model import Goal, Problem
+from cfplan_core.options import PlanOptions as PlanOptions
+from cfplan_core.options import Preference
+from cfplan_core.planning.best_first import BestFirst
+from cfplan_core.planning.constraints import (
+    REASONS,
+    compile_constraints,
+    contradictions,
+)
 from cfplan_core.planning.expedition import Expedition
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.grasp_check import examine_problem
+from cfplan_core.planning.manifold import settle
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
-from cfplan_core.planning.search import Search, Tree
-from cfplan_core.trajectory.frames import Frames, build_frames, overloaded_legs
+from cfplan_core.planning.robustness import Robustness
+from cfplan_core.planning.search import Leg, Search, Tree
+from cfplan_core.trajectory.frames import build_frames, overloaded_legs, straying_legs
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
 
 # Hands with more joints are planned for by drives rather than piece by piece.
 _MOST_JOINTS_SEARCHED = 2
-
-
-@dataclass(frozen=True)
-class PlanOptions:
-    """Limits of a search.
-
-    Attributes:
-        time_budget: Seconds, or None for no limit.
-        max_nodes: Nodes of both trees together, or None for no limit.
-    """
-
-    time_budget: float | None = None
-    max_nodes: int | None = None
-
-    def __post_init__(self) -> None:
-        if self.time_budget is not None and not self.time_budget > 0.0:
-            raise CfplanError(f'time_budget: got {self.time_budget}, expected seconds above zero')
-        if self.max_nodes is not None and not self.max_nodes > 0:
-            raise CfplanError(f'max_nodes: got {self.max_nodes}, expected a number above zero')
 
 
 @dataclass(frozen=True)
@@ -59,6 +52,9 @@ class Progress:
     nodes: tuple[int, int]
     formations: int
     message: str
+
+
+TOO_WEAK = 'a joint would exceed its effort limit'
 
 
 class _BudgetExhaustedError(Exception):
@@ -103,40 +99,147 @@ class _Planning:
         self.cancel = cancel
         self.began = time.perf_counter()
         self.system = ContactSystem(problem)
+        self.moving = self.system
         self.model = FrictionlessModel(self.system.load)
         self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
-        self.search: Search | Expedition | None = None
+        self.search: Search | BestFirst | Expedition | None = None
 
     def run(self) -> PlanResult:
         examined = examine_problem(self.system, self.model)
-        if examined.findings:
-            message = '\n'.join(str(finding) for finding in examined.findings)
+        try:
+            constraints = compile_constraints(self.system, self.model, self.options)
+        except CfplanError as error:
+            return self._answer(Status.INVALID, f'options: {error}')
+        findings = examined.findings or contradictions(
+            constraints, self.system, examined, self.problem.goal, self.options.held_joints
+        )
+        if findings:
+            message = '\n'.join(str(finding) for finding in findings)
             return self._answer(Status.INVALID, message)
+        start = examined.start.z
+        if self.options.held_joints:
+            self.moving = HeldSystem(self.system, self.options.held_joints, start)
+            start = self.moving.reduced(start)
+        # Sheets know of no constraint, and the search for the best plan moves straight.
+        plain = constraints.none and self.moving is self.system
+        resolution = self.options.resolution if plain and not self.options.optimal else None
+        self.roadmap = Roadmap(self.moving, self.model, self._checkpoint, constraints, resolution)
         goal: FloatArray | GoalTest
         try:
             if examined.goal is not None:
-                goal = examined.goal.z
+                goal = self.moving.reduced(examined.goal.z)
+                if self.options.held_joints:
+                    goal = settle(self.moving, goal, examined.goal.pairs)
             else:
-                goal = GoalTest(self.system, self.problem.goal)
+                goal = GoalTest(self.moving, self._free_goal())
         except CfplanError as error:
             return self._answer(Status.INVALID, f'goal: {error}')
         try:
-            frames = self._search(examined.start.z, goal)
+            if self.options.optimal:
+                best = self._search_best(start, goal)
+                if best is not None:
+                    return best
+                legs = None
+            else:
+                legs = self._search(start, goal)
         except _BudgetExhaustedError as stop:
             return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
-        if frames is None:
+        if legs is None:
             return self._answer(Status.INFEASIBLE, f'no path; {self._explored()}{self._doubt()}')
+        return self._solved(legs, '')
+
+    def _solved(self, legs: Sequence[Leg], message: str) -> PlanResult:
+        """The answer for a path, with the trees of the search that found it."""
+        frames = build_frames(self.system, self.model, self._whole(legs))
         return replace(
-            self._answer(Status.SOLVED, ''),
+            self._answer(Status.SOLVED, message),
             times=frames.times,
             joints=frames.joints,
             object_poses=frames.object_poses,
             torque_lower=frames.torque_lower,
             torque_upper=frames.torque_upper,
             segments=frames.segments,
+            reversible=self.model.reversible,
+            entry_lower=frames.entry_lower,
+            entry_upper=frames.entry_upper,
         )
 
-    def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> Frames | None:
+    def _free_goal(self) -> Goal:
+        """The goal without the angles of held joints, which agree with the start's."""
+        goal, held = self.problem.goal, self.options.held_joints
+        if not held or goal.joints is None:
+            return goal
+        joints = {name: angle for name, angle in goal.joints.items() if name not in held}
+        return replace(goal, joints=joints)
+
+    def _whole(self, legs: Sequence[Leg]) -> list[Leg]:
+        """Legs in the coordinates of all joints."""
+        return [replace(leg, points=self.moving.expanded(leg.points)) for leg in legs]
+
+    def _search_best(self, start: FloatArray, goal: FloatArray | GoalTest) -> PlanResult | None:
+        """Search for the best plans, from the first one on; None if there is none at all.
+
+        Motions that a joint's effort cannot hold are left out, and the search is run again.
+        """
+        options, stopped = self.options, ''
+        robustness = Robustness(self.system, self.model)
+
+        def rate(formation: Formation, z: FloatArray) -> float:
+            return robustness.ratios(formation, self.moving.expanded(z)).worst
+
+        def settled(states: int) -> None:
+            self._grown(states, 1)
+
+        best = BestFirst(self.roadmap, start, goal, options.prefer, rate, settled)
+        first, first_search = None, None
+        if not options.required:
+            first, first_search = self._search(start, goal), self.search
+            if first is None:
+                return None
+        self.search = best
+        try:
+            best.choose(options.alternatives, first, self._refuse)
+        except _BudgetExhaustedError as stop:
+            stopped = str(stop)
+            best.settle_for_best(first, self._refuse)
+        message = self._verdict(stopped, max(len(best.chosen), first is not None))
+        results = []
+        for label in best.chosen:
+            best.conclude(label)
+            legs, _ = label.path()
+            results.append(replace(self._solved(legs, message), margin=best.margin(legs)))
+        if not results and first is not None:
+            self.search = first_search
+            results = [replace(self._solved(first, message), margin=best.margin(first))]
+        if not results and stopped:
+            raise _BudgetExhaustedError(stopped)
+        return replace(results[0], alternatives=tuple(results[1:])) if results else None
+
+    def _refuse(self, legs: Sequence[Leg]) -> list[int]:
+        """Which legs cannot be held, with the reasons noted."""
+        whole = self._whole(legs)
+        refused = dict.fromkeys(overloaded_legs(self.system, self.model, whole), TOO_WEAK)
+        refused |= straying_legs(self.system, whole, self.roadmap.constraints.bounds)
+        self.roadmap.failures.update(refused.values())
+        return list(refused)
+
+    def _verdict(self, stopped: str, found: int) -> str:
+        """Say whether plans are the best, and among what."""
+        prefer = self.options.prefer
+        name = Preference.FEWEST_SEGMENTS if prefer is Preference.FIRST else prefer
+        if stopped:
+            return f'{name.value}: the best found so far; {stopped}'
+        wanted = self.options.alternatives
+        few = f'no more than {found} different plans, ' if found < wanted else ''
+        pieces = self.roadmap.pieces
+        regions = sum(piece.dimension > 1 for piece in pieces)
+        rays = f', {regions} of them regions of dimension 2 and more seen along rays'
+        return (
+            f'{name.value}: {few}none better exists in the {len(pieces)} pieces of contact '
+            f'formations explored{rays if regions else ""}'
+        )
+
+    def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> list[Leg] | None:
         """Search until a path is found that the joints' efforts can hold.
 
         Efforts are looked at on paths only: points and curves that need more than a joint's limit
@@ -144,20 +247,20 @@ class _Planning:
         that is there.
         """
         if self.system.joint_count > _MOST_JOINTS_SEARCHED:
-            self.search = Expedition(self.roadmap, start, goal, self._grown)
-            if not self.search.run():
-                raise _BudgetExhaustedError(f'no path found by {self.search.drives} drives')
-            return build_frames(self.system, self.model, self.search.path())
+            self.search = expedition = Expedition(self.roadmap, start, goal, self._grown)
+            if not expedition.run():
+                raise _BudgetExhaustedError(f'no path found by {expedition.drives} drives')
+            return expedition.path()
         blocked: frozenset[int] = frozenset()
         while True:
-            self.search = Search(self.roadmap, start, goal, blocked, self._grown)
-            if not self.search.run():
+            self.search = search = Search(self.roadmap, start, goal, blocked, self._grown)
+            if not search.run():
                 return None
-            legs = self.search.path()
-            too_weak = overloaded_legs(self.system, self.model, legs)
-            if not too_weak:
-                return build_frames(self.system, self.model, legs)
-            for index in too_weak:
+            legs = search.path()
+            refused = self._refuse(legs)
+            if not refused:
+                return legs
+            for index in refused:
                 leg = legs[index]
                 piece = self.roadmap.pieces[leg.piece]
                 # The first leg begins at the start, the last one ends at the goal.
@@ -169,7 +272,6 @@ class _Planning:
                         self.roadmap.regions.drop(piece, z)
                 else:
                     blocked |= {piece.index}
-            self.roadmap.failures['a joint would exceed its effort limit'] += len(too_weak)
 
     def _checkpoint(self) -> None:
         """Stop the search when it has to."""
@@ -198,17 +300,16 @@ class _Planning:
 
     def _doubt(self) -> str:
         """How far an answer of no path is short of a proof."""
-        regions = sum(piece.dimension > 1 for piece in self.roadmap.pieces)
-        blocked = self.roadmap.failures['a joint would exceed its effort limit']
+        blocked = self.roadmap.failures[TOO_WEAK]
         doubt = ''
         if blocked:
             doubt += f'. Left out, as a joint would exceed its effort limit: {blocked} pieces'
-        if not regions:
-            return doubt
-        return doubt + (
-            '. Contact formations of dimension 0 and 1 were searched completely, '
-            f'{regions} regions of dimension 2 and more only along rays'
-        )
+        for why in REASONS:
+            count = sum(n for reason, n in self.roadmap.failures.items() if reason.endswith(why))
+            if count:
+                doubt += f'. Not followed, as {why}: {count} ways'
+        coverage = self.roadmap.regions.coverage()
+        return f'{doubt}. {coverage[0].upper()}{coverage[1:]}'
 
     def _answer(self, status: Status, message: str) -> PlanResult:
         trees = self.search.trees if self.search is not None else ()

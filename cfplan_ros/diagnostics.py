@@ -18,7 +18,7 @@ class LastPlan:
 
     Attributes:
         problem: Its name.
-        outcome: Name of the error code; ``NONE`` for a plan.
+        outcome: ``SOLVED``, or the name of the error code.
         planning_time: s.
     """
 

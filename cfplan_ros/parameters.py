@@ -16,6 +16,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from cfplan_core.errors import CfplanError
 from cfplan_ros.conversions.hands import load_hand, load_object
 from cfplan_ros.conversions.requests import Setup
+from cfplan_ros.visualization.frames import OBJECT_FRAME, WORLD_FRAME, base_frame, link_frame
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -85,7 +86,11 @@ TABLE = (
         'Acceleration of gravity, x and y in the planner frame [m/s^2], of requests that bring '
         'none.',
     ),
-    Row('frame_id', 'palm', "The planner frame: the hand's plane, x right, y up, z out of it."),
+    Row(
+        'frame_id',
+        WORLD_FRAME,
+        "The planner frame: the hand's plane, x right, y up, z out of it.",
+    ),
     Row(
         'default_time_budget',
         10.0,
@@ -231,6 +236,10 @@ def configure(
                 parts[name] = load(found(file)) if file else None
             except CfplanError as error:
                 faults.append(f'{name}: {error}')
+    if settings.frame_id in _frames(parts['hand_file']):
+        faults.append(
+            f'frame_id: got {settings.frame_id!r}, expected a name that no link or object has'
+        )
     if faults:
         raise ParameterError('\n'.join(faults))
     return Configuration(settings, parts['hand_file'], parts['object_file'])
@@ -242,11 +251,14 @@ def found(name: str) -> Path:
     Raises:
         CfplanError: There is no such file.
     """
-    places = [Path(), *_config_directories()]
-    for directory in places:
-        if (directory / name).exists():
-            return directory / name
-    looked = ' or '.join(str((directory / name).absolute()) for directory in places)
+    paths = [directory / name for directory in (Path(), *_config_directories())]
+    for path in paths:
+        try:
+            if path.exists():
+                return path
+        except OSError as error:
+            raise CfplanError(f'got {name!r}, expected a file: {error.strerror}') from None
+    looked = ' or '.join(dict.fromkeys(str(path.absolute()) for path in paths))
     raise CfplanError(f'got {name!r}, expected a file, {looked}')
 
 
@@ -256,6 +268,13 @@ def _config_directories() -> Iterable[Path]:
     except PackageNotFoundError:
         # Not installed as a ROS package: config/ is beside this one in the source tree.
         yield Path(__file__).resolve().parents[1] / 'config'
+
+
+def _frames(hand: dict[str, Any] | None) -> set[str]:
+    """Frames that lie in the planner frame, by the hand as a problem file has it."""
+    fingers = hand['fingers'] if hand else []
+    links = {link_frame(f['name'], link['name']) for f in fingers for link in f['links']}
+    return {OBJECT_FRAME, *(base_frame(f['name']) for f in fingers), *links}
 
 
 def _value(row: Row, value: Any) -> Value:
@@ -274,6 +293,8 @@ def _faults_of_values(settings: Settings) -> Iterable[str]:
             f'default_time_budget: got {settings.default_time_budget:g} s, expected at most '
             f'maximal_time_budget, {settings.maximal_time_budget:g} s'
         )
+    if '\0' in settings.record_directory:
+        yield 'record_directory: got a null byte, expected a path'
     if not settings.record_directory:
         yield "record_directory: got '', expected a path; to record nothing set record to false"
 

@@ -21,6 +21,7 @@ import threading
 import traceback
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -64,6 +65,8 @@ NAME = 'cfplan_planner'
 
 # How long shutting down may wait for each of: the search, the answers, the files. Seconds.
 _PATIENCE = 1.0
+# Files are worth more of it; what is not complete by then the next start completes.
+_FILE_PATIENCE = 3.0
 # Playing begins this much after it was asked for: time to compute the first messages, ns.
 _LEAD_IN = 200_000_000
 
@@ -126,6 +129,16 @@ class PlannerNode(Node):
         self.create_timer(1.0, self._on_diagnostics, clock=steady)
         self.create_timer(1.0, self._hold_pose, clock=steady)
 
+    def introduction(self) -> str:
+        """Say in one line what the node offers, with which hand, and where runs go."""
+        settings = self._configuration.settings
+        hand = f'hand {settings.hand_file}' if settings.hand_file else 'no hand (set hand_file)'
+        runs = f'runs in {Path(settings.record_directory).absolute()}'
+        return (
+            f'ready: service {self.get_fully_qualified_name()}/plan, {hand}, '
+            f'{runs if settings.record else "runs are not recorded"}; Ctrl-C ends it'
+        )
+
     def stop(self) -> None:
         """Cancel what is being planned, have every request answered and every file closed.
 
@@ -140,7 +153,7 @@ class PlannerNode(Node):
         with self._answered:
             self._answered.wait_for(lambda: not self._unanswered, _PATIENCE)
         self._player.close(_PATIENCE)
-        self._keeper.close(_PATIENCE)
+        self._keeper.close(_FILE_PATIENCE)
 
     # Parameters.
 
@@ -207,17 +220,21 @@ class PlannerNode(Node):
         metadata = {**task.metadata(), 'parameters': asdict(settings)}
         run = self._keeper.begin(call.request, metadata, started)
         try:
-            response = carry_out(task, self._planning.canceled, self._now)
+            # A clock that was set back must not put the answer before the request.
+            response = carry_out(task, self._planning.canceled, lambda: max(started, self._now()))
         except Exception:
             self._keeper.finish(run, None, None)
             raise
         solved = response.error_code == Response.NONE
-        messages = plan_messages(response.plan) if solved else []
+        commanded = settings.publish and not call.request.options.plan_only
+        messages = [
+            (topic, message)
+            for topic, message in (plan_messages(response.plan) if solved else ())
+            if commanded or topic not in COMMANDS
+        ]
         self._keeper.keep(run, response, messages)
-        published = settings.publish and not call.request.options.plan_only
         for topic, message in messages:
-            if published or topic not in COMMANDS:
-                self._publish(topic, message)
+            self._publish(topic, message)
         if task.problem is not None and solved:
             self._last_solved = task.problem, response.plan
         self._reply(call, response)
@@ -234,7 +251,7 @@ class PlannerNode(Node):
         name, outcome = response.plan.problem_name, OUTCOMES[response.error_code]
         seconds = seconds_of(response.planning_time)
         self._last_plan = LastPlan(name, outcome, seconds)
-        text = f'{name!r}: {outcome} after {seconds:.3f} s'
+        text = f'{_shortened(name) or "unnamed problem"}: {outcome} after {seconds:.3f} s'
         if capped:
             text += ', the time budget is capped by maximal_time_budget'
         if response.record:
@@ -242,7 +259,7 @@ class PlannerNode(Node):
         log = self.get_logger()
         # One call site for each severity: rclpy holds a call site to one.
         if response.error_msg:
-            log.warning(f'{text}: {response.error_msg}')
+            log.warning(f'{text}: {_shortened(response.error_msg, 2000)}')
         else:
             log.info(text)
 
@@ -258,7 +275,7 @@ class PlannerNode(Node):
             preview(problem, solved, self._now() + _LEAD_IN, speed)
         )
         response.message = (
-            f'playing {solved.problem_name!r}' if response.success else 'a plan is being played'
+            'playing the last plan' if response.success else 'a plan is being played'
         )
         return response
 
@@ -343,7 +360,7 @@ def _run(wake: queue.SimpleQueue[BaseException | None]) -> int:
 
     spinning = threading.Thread(target=spin, name='executor', daemon=True)
     spinning.start()
-    node.get_logger().info('ready')
+    node.get_logger().info(node.introduction())
     # Plain queues of Python can be filled by a signal handler, and waiting for one lets it run.
     failure = wake.get()
     node.stop()
@@ -353,6 +370,11 @@ def _run(wake: queue.SimpleQueue[BaseException | None]) -> int:
     if failure is not None:
         raise failure
     return 0
+
+
+def _shortened(text: str, most: int = 200) -> str:
+    """Return a text that fits into a log."""
+    return text if len(text) <= most else f'{text[:most]}... ({len(text)} characters)'
 
 
 def _private(topic: str) -> str:

@@ -36,25 +36,27 @@ COMMANDS = ('torque_limits', 'joint_trajectory')
 SCENE = ('/tf_static', 'markers')
 
 OUTCOMES = {
-    int(getattr(Response, name)): name
-    for name in (
-        'NONE',
-        'UNKNOWN',
-        'INFEASIBLE',
-        'BUDGET_EXHAUSTED',
-        'CANCELED',
-        'BUSY',
-        'NOT_CONFIGURED',
-        'HAND_MISMATCH',
-        'INVALID_START',
-        'INVALID_GOAL',
-        'INVALID_OBJECT',
-        'INVALID_GRAVITY',
-        'INVALID_OPTIONS',
-        'INVALID_FRAME',
-    )
+    int(Response.NONE): 'SOLVED',
+    **{
+        int(getattr(Response, name)): name
+        for name in (
+            'UNKNOWN',
+            'INFEASIBLE',
+            'BUDGET_EXHAUSTED',
+            'CANCELED',
+            'BUSY',
+            'NOT_CONFIGURED',
+            'HAND_MISMATCH',
+            'INVALID_START',
+            'INVALID_GOAL',
+            'INVALID_OBJECT',
+            'INVALID_GRAVITY',
+            'INVALID_OPTIONS',
+            'INVALID_FRAME',
+        )
+    },
 }
-"""Names of the error codes."""
+"""Names of the error codes; that of no error says what there is."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -123,6 +123,11 @@ class RunKeeper:
         self._finishing.close()
         self._finishing.join(timeout)
 
+    def _show(self, topic: str, message: Any) -> None:
+        # Once the keeper is closed the publishers may be gone; the files are still completed.
+        if not self._finishing.canceled.is_set():
+            self._publish(topic, message)
+
     def _finish(
         self, run: Run | None, problem: Problem | None, plan: Any, stand_back: float
     ) -> None:
@@ -139,7 +144,7 @@ class RunKeeper:
                 due, topic, message = picture
                 at_start = due == nanoseconds_of(plan.header.stamp)
                 if topic in SCENE or (topic == TRANSFORMS and at_start):
-                    self._publish(topic, message)
+                    self._show(topic, message)
                 elif run is None or run.failure:
                     break
                 if run is not None:

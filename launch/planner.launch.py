@@ -31,7 +31,7 @@ def _planner(context):
             output='screen',
             parameters=[
                 value('params_file'),
-                {name: value(name) for name in FILES if value(name)},
+                *({name: value(name)} for name in FILES if value(name)),
             ],
             remappings=remappings,
             arguments=['--ros-args', '--log-level', value('log_level')],

@@ -15,6 +15,8 @@ from cfplan_core.command_line import INTERRUPTED
 from cfplan_core.command_line.animate import animate
 from cfplan_core.command_line.check import check
 from cfplan_core.command_line.console import INVALID_INPUT, complain, complaints, print_findings
+from cfplan_core.command_line.explore import explore
+from cfplan_core.command_line.map import map_command
 from cfplan_core.command_line.plan import plan
 from cfplan_core.command_line.verify import verify
 from cfplan_core.errors import CfplanError, InvalidProblemError
@@ -105,5 +107,5 @@ def application() -> None:
     """
 
 
-for command in (check, plan, verify, animate):
+for command in (check, plan, verify, animate, explore, map_command):
     application.add_command(command)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -22,8 +22,9 @@ from cfplan_core.command_line.console import (
     print_findings,
 )
 from cfplan_core.command_line.inputs import Examined, examine
+from cfplan_core.command_line.plan_options import wanted_plan
 from cfplan_core.command_line.progress import progress_bar
-from cfplan_core.errors import InvalidProblemError
+from cfplan_core.errors import CfplanError, InvalidProblemError
 from cfplan_core.model import Problem
 from cfplan_core.trajectory.plan_result import PlanResult, Status
 
@@ -56,7 +57,8 @@ def finite_seconds(
     'json_path',
     type=click.Path(dir_okay=False, path_type=Path),
     metavar='OUT',
-    help='Write the result here as JSON, whatever the outcome; missing directories are created.',
+    help='Write the result here as JSON, whatever the outcome; missing directories are created. '
+    'Alternatives go beside it, as OUT with .2, .3 and so on before its suffix.',
 )
 @click.option(
     '--figures',
@@ -78,26 +80,35 @@ def finite_seconds(
     metavar='N',
     help='Give up once the two trees have N nodes or more together.',
 )
+@wanted_plan
 def plan(
     file: Path,
     json_path: Path | None,
     figure_directory: Path | None,
     time_budget: float | None,
     max_nodes: int | None,
+    **wanted: Any,
 ) -> int:
     """Search for a plan that solves the problem FILE, and print it as tables.
 
     Exit status: 0 solved, 1 infeasible (searched to the end), 2 invalid input or usage, 3 budget
     exhausted, 130 interrupted.
     """
+    from cfplan_core.planner import PlanOptions
+
     for directory in (json_path.parent if json_path else None, figure_directory):
         if directory is not None:
             directory.mkdir(parents=True, exist_ok=True)
 
+    try:
+        options = PlanOptions(time_budget=time_budget, max_nodes=max_nodes, **wanted)
+    except CfplanError as error:
+        complain(str(error))
+        return INVALID_INPUT
     examined = examine(file)
     try:
         problem = examined.valid_problem()
-        result, interrupted = _search(problem, time_budget, max_nodes)
+        result, interrupted = _search(problem, options)
     except InvalidProblemError as error:
         print_findings(error.findings, complaints())
         if json_path is not None:
@@ -110,6 +121,10 @@ def plan(
     # Files first: they must be there even if the reader of the tables leaves early.
     if json_path is not None:
         write_result(result, json_path)
+        for number, other in enumerate(result.alternatives, 2):
+            write_result(
+                other, json_path.with_name(f'{json_path.stem}.{number}{json_path.suffix}')
+            )
     figures: list[Path] = []
     if figure_directory is not None and result.status is not Status.INVALID:
         from cfplan_core.report.figures import write_figures
@@ -119,14 +134,10 @@ def plan(
     return EXIT_STATUS[result.status]
 
 
-def _search(
-    problem: Problem, time_budget: float | None, max_nodes: int | None
-) -> tuple[PlanResult, bool]:
+def _search(problem: Problem, options: PlanOptions) -> tuple[PlanResult, bool]:
     """Plan with progress shown; return the result and whether Ctrl-C ended the search."""
-    from cfplan_core.planner import PlanOptions
     from cfplan_core.planner import plan as search
 
-    options = PlanOptions(time_budget=time_budget, max_nodes=max_nodes)
     with progress_bar() as bar, _interrupt() as cancel:
         progress = None if bar is None else _shown_on(bar, options)
         result = search(problem, options, progress=progress, cancel=cancel)

@@ -69,6 +69,7 @@ class ContactSystem:
         self.load = np.array([weight[0], weight[1], 0.0])
 
         hand = problem.hand
+        self.joint_names = hand.joint_names
         self.joint_count = len(hand.joints)
         self.dof = 3 + self.joint_count
         self.lower = np.array([joint.lower for joint in hand.joints])
@@ -202,6 +203,14 @@ class ContactSystem:
         c, s = np.cos(phi), np.sin(phi)
         center = np.array([x + c * com[0] - s * com[1], y + s * com[0] + c * com[1]]) / self.size
         return np.concatenate([center, [phi], grasp.joints])
+
+    def reduced(self, z: FloatArray) -> FloatArray:
+        """Leave out what is held of configurations of the whole system: nothing here."""
+        return z
+
+    def expanded(self, z: FloatArray) -> FloatArray:
+        """Turn configurations of shape (s, 3 + n) into those of the whole system."""
+        return z
 
     def object_poses(self, z: FloatArray) -> FloatArray:
         """Pose of the object's frame in SI units, shape (s, 3), for configurations (s, 3 + n)."""

@@ -79,6 +79,12 @@ class ContactModel(Protocol):
         Unlike `torque_limits` this asks for all joints at once.
         """
 
+    def needed_forces(self, gradients: FloatArray) -> FloatArray:
+        """Smallest F with an equilibrium in which no contact force exceeds F; shape (s,).
+
+        In weights of the object; infinite where no equilibrium exists.
+        """
+
     def motion(self, gradients: FloatArray, joint_velocity: FloatArray) -> Motion:
         """Predict the object's velocity; `gradients` of shape (k, 3 + n), velocity (n,).
 

@@ -17,6 +17,7 @@ from cfplan_core.errors import JammedError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.closure import span_margin, span_margins
 from cfplan_core.mechanics.contact_model import Margins, Motion
+from cfplan_core.mechanics.needed_force import needed_forces
 
 _SINGULAR = 1e-12
 _NEGATIVE = 1e-9
@@ -97,6 +98,10 @@ class FrictionlessModel:
             )
             holds[index] = found.status == 0
         return holds
+
+    def needed_forces(self, gradients: FloatArray) -> FloatArray:
+        """Smallest possible largest contact force, in weights, of each configuration."""
+        return needed_forces(gradients[..., :3], self.load)
 
     def _equilibria(self, w: FloatArray, j: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Torques at the basic solutions of W c = −f, and which of them have c ≥ 0.

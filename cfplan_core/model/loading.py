@@ -30,6 +30,8 @@ from cfplan_core.model.problem import Problem
 from cfplan_core.model.schema import schema_faults
 from cfplan_core.model.yaml_file import DEEPEST_NESTING, read_yaml
 
+# Of the files that are most easily taken for problems.
+_PLAN_FORMAT = 'cfplan/plan/1'
 _CONTENTS = 'a mapping of format, name, gravity, hand, object, contact, start, goal'
 _PARTS = {'hand': 'a mapping of palm, fingers', 'object': 'a mapping of vertices, mass'}
 
@@ -98,6 +100,9 @@ def _reading(
     if not isinstance(data, dict):
         wrong = Fault((), shown(data), _CONTENTS)
         return ProblemReading(None, findings_of([*faults, wrong], data, file, {}))
+    if data.get('format') == _PLAN_FORMAT:
+        wrong = Fault((), f'a plan ({_PLAN_FORMAT})', 'a problem (cfplan/problem/1)')
+        return ProblemReading(None, findings_of([wrong], {}, file, {}))
     whole, files, part_faults = _with_parts(data, file, directory)
     faults = [*faults, *part_faults]
     known = {fault.path for fault in faults}

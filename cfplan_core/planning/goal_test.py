@@ -39,7 +39,7 @@ class GoalTest:
             columns += [0, 1, 2]
             wanted += [center.real, center.imag, float(phi)]
             tolerance += [goal.tolerance.position / system.size] * 2 + [goal.tolerance.angle]
-        names = system.problem.hand.joint_names
+        names = system.joint_names
         for name, angle in (goal.joints or {}).items():
             if name not in names:
                 raise CfplanError(f'joint {name!r}: expected one of {", ".join(names)}')
@@ -65,7 +65,7 @@ class GoalTest:
             return np.asarray(piece.points[len(piece.points) // 2])
         distance = np.abs(piece.points[:, self.columns] - self.wanted).max(axis=1)
         for nearest in _local_minima(distance):
-            if piece.dimension == 0:
+            if piece.dimension != 1:
                 z = piece.points[nearest]
             elif distance[nearest] < 2.0 * STEP:
                 z = self._nearest(piece, piece.points[nearest])

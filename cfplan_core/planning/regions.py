@@ -23,7 +23,7 @@ from cfplan_core.planning.events import OPEN_EVENTS, EventKind
 from cfplan_core.planning.manifold import independent_rows, tangent_basis
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.stability_classes import split_by_class
-from cfplan_core.planning.tracing import STABILITY_MARGIN, Trace, classify
+from cfplan_core.planning.tracing import STABILITY_MARGIN, STEP, Trace, classify
 from cfplan_core.planning.transitions import Departure, crossings
 
 if TYPE_CHECKING:
@@ -48,6 +48,20 @@ class Regions:
         self._known: dict[tuple[Formation, Stability], list[Region]] = {}
         self._beyond: dict[int, list[tuple[FloatArray, Piece]]] = {}
         self._beside: dict[int, list[tuple[FloatArray, Piece]]] = {}
+
+    def coverage(self) -> str:
+        """Say how completely formations were explored."""
+        regions = sum(piece.dimension > 1 for piece in self._roadmap.pieces)
+        if not regions:
+            return (
+                'everything that can be reached with first-order stability was explored: no '
+                'region of dimension 2 or more, and curves in steps of at most '
+                f'{STEP:g} rad and object sizes'
+            )
+        return (
+            'contact formations of dimension 0 and 1 were searched completely, '
+            f'{regions} regions of dimension 2 and more only along rays'
+        )
 
     def around(self, formation: Formation, z: FloatArray) -> Region:
         """Return the region of a formation that a stable configuration lies inside."""
@@ -109,21 +123,30 @@ class Regions:
 
     def _openings(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
         tracer = self._roadmap.tracer
+        points = self._samples(piece)
         for pair in piece.formation.pairs:
             rest = Formation(tuple(p for p in piece.formation.pairs if p != pair))
             if len(rest) < 3:
                 continue
-            holds = tracer.margins(rest, piece.points).stable > STABILITY_MARGIN
+            holds = tracer.margins(rest, points).stable > STABILITY_MARGIN
             # More than this formation touches, or links meet, at the ends.
             holds[0] = holds[-1] = False
-            for middle in _middles(holds):
-                z = piece.points[middle]
+            for place in self._places(holds):
+                z = points[place]
                 heading = self._opening(rest, pair, z)
                 if heading is None:
                     continue
                 region = self._enter(z, Departure(rest, heading, frozenset({pair})))
                 if region is not None:
                     yield z, region
+
+    def _samples(self, piece: Piece) -> FloatArray:
+        """Points of a curve, shape (s, 3 + n), where contacts may open."""
+        return piece.points
+
+    def _places(self, holds: BoolArray) -> list[int]:
+        """Indices of points at which to open a contact, where the rest holds the object."""
+        return _middles(holds)
 
     def _opening(self, rest: Formation, pair: int, z: FloatArray) -> FloatArray | None:
         """Direction in which a gap opens fastest while the other contacts are kept."""
@@ -142,7 +165,7 @@ class Regions:
         trace = self._ray(z, way, _DEPTH)
         self._roadmap.attempts += 1
         if len(trace.points) < 3:
-            self._roadmap.failures[f'at once, {trace.kind.value}'] += 1
+            self._roadmap.failures[f'at once, {trace.why}'] += 1
             return None
         points = split_by_class(self._roadmap.tracer, way.formation, trace.points)[0][1]
         return self._merge(way.formation, z, points[: len(points) // 2 + 1])
@@ -239,14 +262,14 @@ class Regions:
             (_, points), *others = split_by_class(roadmap.tracer, region.formation, trace.points)
             end = points[-1]
             if np.abs(end - region.anchor).max() < SAME:
-                roadmap.failures[f'at once, {trace.kind.value}'] += 1
+                roadmap.failures[f'at once, {trace.why}'] += 1
                 continue
             if others:
                 ways = [Departure(region.formation, _heading(points), frozenset())]
             elif trace.kind in OPEN_EVENTS:
                 ways = self._ways(region, end, _heading(points))
             else:
-                roadmap.failures[trace.kind.value] += 1
+                roadmap.failures[trace.why] += 1
                 continue
             region.links.append((end, points))
             if not others and self._joins(region, end):

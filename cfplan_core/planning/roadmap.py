@@ -18,13 +18,16 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
+from cfplan_core.options import RESOLUTION
+from cfplan_core.planning.constraints import UNCONSTRAINED, Constraints
 from cfplan_core.planning.events import OPEN_EVENTS
 from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
 from cfplan_core.planning.pieces import SAME, Junction, Piece
 from cfplan_core.planning.regions import Regions
+from cfplan_core.planning.sheets import Sheets
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STEP, Trace, Tracer, classify
-from cfplan_core.planning.transitions import Departure, departures, surroundings
+from cfplan_core.planning.transitions import Departure, Surroundings, departures, surroundings
 
 
 class Roadmap:
@@ -42,6 +45,8 @@ class Roadmap:
         system: ContactSystem,
         model: ContactModel,
         checkpoint: Callable[[], None] = lambda: None,
+        constraints: Constraints = UNCONSTRAINED,
+        resolution: float | None = RESOLUTION,
     ) -> None:
         """Start empty.
 
@@ -49,17 +54,25 @@ class Roadmap:
             system: Compiled problem.
             model: Mechanics.
             checkpoint: Called before every stretch of work; may raise to interrupt.
+            constraints: What every configuration must keep, besides stability.
+            resolution: Spacing of the grid that regions of hands with two joints are filled over,
+                rad; None to explore them along rays, as they are with constraints.
         """
         self.system = system
         self.model = model
-        self.tracer = Tracer(system, model, checkpoint)
+        self.constraints = constraints
+        self.tracer = Tracer(system, model, checkpoint, constraints.bounds)
         self.pieces: list[Piece] = []
         self.failures: Counter[str] = Counter()
         self.attempts = 0
         self._junctions: list[Junction] = []
         self._cells: dict[tuple[int, ...], list[Junction]] = {}
         self._curves: dict[Formation, list[Piece]] = {}
-        self.regions = Regions(self)
+        self.regions: Regions = (
+            Regions(self)
+            if resolution is None or system.joint_count != 2
+            else Sheets(self, resolution)
+        )
 
     def formations(self) -> int:
         """Count the distinct contact formations that were met."""
@@ -110,6 +123,10 @@ class Roadmap:
                 if np.abs(junction.z - z).max() < SAME:
                     return junction
         around = surroundings(self.system, z)
+        refusal = self.constraints.refusal(around.pairs, around.together)
+        if refusal is not None:
+            self.failures[refusal] += 1
+            return self._remember(self._refused(z, around), cells)
         stability = Stability.UNSTABLE
         if len(around.pairs) and not around.held_vertex:
             stability = classify(self.model.margins(around.gradients[None]))
@@ -118,7 +135,15 @@ class Roadmap:
             and len(independent_rows(around.gradients)) == self.system.dof
         )
         formation = Formation(tuple(int(pair) for pair in around.pairs))
-        junction = Junction(z, formation, stability, isolated, around)
+        return self._remember(Junction(z, formation, stability, isolated, around), cells)
+
+    @staticmethod
+    def _refused(z: FloatArray, around: Surroundings) -> Junction:
+        """Make a junction that nothing leads through."""
+        formation = Formation(tuple(int(pair) for pair in around.pairs))
+        return Junction(z, formation, Stability.UNSTABLE, False, None, ways=[])
+
+    def _remember(self, junction: Junction, cells: list[tuple[int, ...]]) -> Junction:
         self._junctions.append(junction)
         for cell in cells:
             self._cells.setdefault(cell, []).append(junction)
@@ -172,7 +197,7 @@ class Roadmap:
         junction.taken[way] = None
         trace = self._follow(junction.z, departure)
         if np.abs(trace.end - junction.z).max() < SAME:
-            self.failures[f'at once, {trace.kind.value}'] += 1
+            self.failures[f'at once, {trace.why}'] += 1
             return
         known = self._on_curve(departure.formation, trace.points[1])
         if known is not None:
@@ -193,7 +218,7 @@ class Roadmap:
     def _end(self, trace: Trace) -> Junction | None:
         if trace.kind in OPEN_EVENTS:
             return self.junction(trace.end)
-        self.failures[trace.kind.value] += 1
+        self.failures[trace.why] += 1
         return None
 
     def _add_curve(

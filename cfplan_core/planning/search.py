@@ -161,6 +161,10 @@ class Search:
 
     def _fulfilled(self, test: GoalTest, piece: Piece) -> FloatArray | None:
         """Where a piece fulfils a partial goal, shape (3 + n,)."""
+        if piece is self.trees[0].nodes[0].piece and test.may_hold(piece):
+            start = self.trees[0].root
+            if test.fits(start):
+                return start
         goal = test(piece)
         if goal is not None or not isinstance(piece, Region) or not test.may_hold(piece):
             return goal

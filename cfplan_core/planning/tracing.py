@@ -8,7 +8,7 @@ cut at the first.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from cfplan_core.contact.gaps import gap_gradients, gaps, wedge_lifts
 from cfplan_core.contact.system import ContactSystem, IntArray, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Margins, Stability
+from cfplan_core.planning.bounds import Bound
 from cfplan_core.planning.bracketing import enclose
 from cfplan_core.planning.events import Candidate, EventKind, sight
 from cfplan_core.planning.locating import locate
@@ -30,6 +31,8 @@ STEP = 0.04
 _STRETCH = 10
 _SMALLEST_STEP = 1e-7
 _INNER = np.array([0.25, 0.5, 0.75])
+# Bounds are looked at between samples, too, where they come nearer than this.
+_NARROW = 0.1
 LONGEST = 100.0
 
 # Chooses the motion from a configuration and the tangent basis there: a vector in the span of the
@@ -45,11 +48,13 @@ class Trace:
         points: Shape (s, 3 + n), from the start to the event, both included.
         kind: What ended it.
         pairs: The pairs that closed or reached their edge's end; a joint's index for a limit.
+        why: Says what ended it: the event, or which bound was reached.
     """
 
     points: FloatArray
     kind: EventKind
     pairs: tuple[int, ...] = ()
+    why: str = ''
 
     @property
     def end(self) -> FloatArray:
@@ -74,6 +79,7 @@ class Tracer:
         system: ContactSystem,
         model: ContactModel,
         checkpoint: Callable[[], None] = lambda: None,
+        bounds: Sequence[Bound] = (),
     ) -> None:
         """Prepare.
 
@@ -81,14 +87,45 @@ class Tracer:
             system: Compiled problem.
             model: Judges stability.
             checkpoint: Called before every stretch; may raise to interrupt.
+            bounds: What a motion must stay within, besides stable; it ends where it does not.
         """
         self.system = system
         self.model = model
         self.checkpoint = checkpoint
+        self.bounds = tuple(bounds)
 
     def margins(self, formation: Formation, z: FloatArray) -> Margins:
         """Stability margins of a formation at configurations of shape (s, 3 + n)."""
-        return self.model.margins(self.gradients(z, formation.array))
+        return self.judge(z, self.gradients(z, formation.array))
+
+    def judge(self, z: FloatArray, gradients: FloatArray) -> Margins:
+        """Stability margins, lowered to those of the bounds.
+
+        Args:
+            z: Shape (s, 3 + n).
+            gradients: Shape (s, k, 3 + n), of the gaps of the contacts there.
+        """
+        margins = self.model.margins(gradients)
+        for bound in self.bounds:
+            margins = margins._replace(
+                stable=np.minimum(margins.stable, bound.margins(z, gradients))
+            )
+        return margins
+
+    def binding(self, z: FloatArray, gradients: FloatArray) -> Bound | None:
+        """Which bound ends a motion at a configuration; None if stability does.
+
+        Args:
+            z: Shape (1, 3 + n).
+            gradients: Shape (1, k, 3 + n).
+        """
+        tightest = None
+        least = float(self.model.margins(gradients).stable[0])
+        for bound in self.bounds:
+            margin = float(bound.margins(z, gradients)[0])
+            if margin < least:
+                tightest, least = bound, margin
+        return tightest
 
     def gradients(self, z: FloatArray, pairs: IntArray) -> FloatArray:
         """Gap gradients of pairs at configurations of shape (s, 3 + n)."""
@@ -129,8 +166,8 @@ class _Pursuit:
         longest: float,
         held: tuple[int, ...],
     ) -> None:
+        self.tracer = tracer
         self.system = tracer.system
-        self.model = tracer.model
         self.checkpoint = tracer.checkpoint
         self._gradients = tracer.gradients
         self.formation = formation
@@ -173,8 +210,16 @@ class _Pursuit:
         """Tell whether a closed curve has come back to its start."""
         return bool(np.abs(samples - self.start).max(axis=1).min() < 0.75 * STEP)
 
-    def _finish(self, kind: EventKind, pairs: tuple[int, ...] = ()) -> Trace:
-        return Trace(np.concatenate(self.points), kind, pairs)
+    def _finish(
+        self, kind: EventKind, pairs: tuple[int, ...] = (), last: FloatArray | None = None
+    ) -> Trace:
+        """The trace so far; `last`, shape (1, 3 + n), is where the end was seen if not there."""
+        points, why = np.concatenate(self.points), kind.value
+        if kind is EventKind.UNSTABLE and self.tracer.bounds:
+            at = points[-1:] if last is None else last
+            bound = self.tracer.binding(at, self._gradients(at, self.contacts))
+            why = why if bound is None else bound.reason
+        return Trace(points, kind, pairs, why)
 
     def _stretch(self, z: FloatArray, direction: FloatArray) -> FloatArray | None:
         """Points ahead along a direction, shape (s, 3 + n), z first; None if there are none."""
@@ -214,9 +259,12 @@ class _Pursuit:
                 # An edge that lay flush would dip into the edge that its vertex touches.
                 return self._finish(EventKind.CONTACT, self.formation.pairs)
         sighting = sight(self.system, self.formation, samples, placed)
-        samples, stable = self._watch(samples, self.model.margins(gradients), sighting.interval)
+        margins = self.tracer.judge(samples, gradients)
+        samples, stable = self._watch(samples, margins, sighting.interval)
         lost = int(np.argmax(stable[1:] <= 0.0)) if (stable[1:] <= 0.0).any() else len(stable)
         if self.fresh and lost == 0:
+            return self._finish(EventKind.UNSTABLE, last=samples[1:2])
+        if self.fresh and self.tracer.bounds and self._out_of_bounds(samples[:1]):
             return self._finish(EventKind.UNSTABLE)
         if self.redundant:
             apart = np.abs(gaps(self.system, placed, self.contacts).gap).max(axis=1) > 1e-7
@@ -252,17 +300,29 @@ class _Pursuit:
         """
         stable = margins.stable - STABILITY_MARGIN
         turns = (margins.signs[1:] != margins.signs[:-1]).any(axis=1)
+        if self.tracer.bounds:
+            lowest = (stable[1:-1] <= stable[:-2]) & (stable[1:-1] <= stable[2:])
+            lowest &= stable[1:-1] < _NARROW
+            turns[:-1] |= lowest
+            turns[1:] |= lowest
         suspects = turns & (stable[1:] > 0.0) & (stable[:-1] > 0.0)
         suspects[last + 1 :] = False
         for interval in np.flatnonzero(suspects):
             ends = samples[interval], samples[interval + 1]
             between = self.chart.between(*ends, _INNER)
-            inner = self.model.margins(self._gradients(between, self.contacts)).stable
+            inner = self.tracer.judge(between, self._gradients(between, self.contacts)).stable
             if (inner <= STABILITY_MARGIN).any():
                 first = int(np.argmax(inner <= STABILITY_MARGIN))
                 samples = np.concatenate([samples[: interval + 1], between[first : first + 1]])
                 return samples, np.append(stable[: interval + 1], -STABILITY_MARGIN)
         return samples, stable
+
+    def _out_of_bounds(self, z: FloatArray) -> bool:
+        """Tell whether a configuration of shape (1, 3 + n) breaks a bound."""
+        gradients = self._gradients(z, self.contacts)
+        return any(
+            not bound.margins(z, gradients)[0] > STABILITY_MARGIN for bound in self.tracer.bounds
+        )
 
     def _take(self, samples: FloatArray) -> None:
         self.points.append(samples)
@@ -337,8 +397,9 @@ class _Pursuit:
         """Find the last stable configuration between two points of which the first is stable."""
 
         def margin(places: FloatArray) -> FloatArray:
-            gradients = self._gradients(chart.between(before, after, places), self.contacts)
-            return self.model.margins(gradients).stable - STABILITY_MARGIN
+            between = chart.between(before, after, places)
+            gradients = self._gradients(between, self.contacts)
+            return self.tracer.judge(between, gradients).stable - STABILITY_MARGIN
 
         place = np.array([enclose(margin)[0]])
         return np.asarray(chart.between(before, after, place)[0])

@@ -28,6 +28,7 @@ def plan_table(result: PlanResult, problem: Problem | None = None) -> Group:
     if result.solved:
         return Group(
             _headline(result),
+            *(() if result.margin is None else (Text(), _choice_table(result))),
             Text(),
             _titled('Segments', _segment_table(result)),
             _titled('Joint angles (rad)', _joint_table(result, problem)),
@@ -76,7 +77,7 @@ def _segment_table(result: PlanResult) -> Table:
     table = _new_table()
     table.add_column('No.', justify='right')
     table.add_column('Contacts', overflow='fold')
-    table.add_column('Stability')
+    table.add_column('Stability,\nneeded force')
     table.add_column('Frames', justify='right')
     table.add_column('Time (s)', justify='right')
     for k, segment in enumerate(result.segments):
@@ -84,12 +85,35 @@ def _segment_table(result: PlanResult) -> Table:
         table.add_row(
             str(k + 1),
             Text('\n'.join(segment.contacts)),
-            segment.stability.replace('_', ' '),
+            segment.stability.replace('_', ' ') + _needed(segment.needed_force),
             f'{segment.first_frame} to {segment.last_frame}',
             f'{start:.2f} to {end:.2f}\n({end - start:.2f})',
             end_section=True,
         )
     return table
+
+
+def _choice_table(result: PlanResult) -> Table:
+    """The plan and its alternatives with what they cost."""
+    table = _new_table()
+    table.add_column('Plan')
+    for name in ('Segments', 'Length (rad)', 'Needed force', 'Margin', 'Fewest, most contacts'):
+        table.add_column(name, justify='right')
+    for number, plan in enumerate((result, *result.alternatives), 1):
+        contacts = [len(segment.contacts) for segment in plan.segments]
+        table.add_row(
+            str(number) if number > 1 else '1, below',
+            str(len(plan.segments)),
+            f'{plan.length:.3f}',
+            '' if plan.needed_force is None else f'{plan.needed_force:.2f}',
+            '' if plan.margin is None else f'{plan.margin:.3g}',
+            f'{min(contacts)}, {max(contacts)}',
+        )
+    return table
+
+
+def _needed(force: float | None) -> str:
+    return '' if force is None else f'\n{force:.2f} weights'
 
 
 def _joint_table(result: PlanResult, problem: Problem | None) -> Table:

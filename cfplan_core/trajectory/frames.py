@@ -11,6 +11,7 @@ from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
+from cfplan_core.planning.bounds import Bound
 from cfplan_core.planning.manifold import independent_rows, project
 from cfplan_core.planning.search import Leg
 from cfplan_core.planning.stability_classes import split_by_class
@@ -39,6 +40,8 @@ class Frames:
     torque_lower: FloatArray
     torque_upper: FloatArray
     segments: tuple[Segment, ...]
+    entry_lower: FloatArray
+    entry_upper: FloatArray
 
 
 def overloaded_legs(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> list[int]:
@@ -52,6 +55,20 @@ def overloaded_legs(system: ContactSystem, model: ContactModel, legs: Sequence[L
         if not model.holds_within(gradients, -effort - weight, effort - weight).all():
             overloaded.append(index)
     return overloaded
+
+
+def straying_legs(
+    system: ContactSystem, legs: Sequence[Leg], bounds: Sequence[Bound]
+) -> dict[int, str]:
+    """Tell which legs have frames beyond a bound: their indices, each with the bound's reason."""
+    straying: dict[int, str] = {}
+    for index, leg in enumerate(legs if bounds else ()):
+        z = _evenly(system, leg)
+        gradients = gap_gradients(system, system.place(z), leg.formation.array)
+        for bound in bounds:
+            if not (bound.margins(z, gradients) >= 0.0).all():
+                straying.setdefault(index, bound.reason)
+    return straying
 
 
 def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> Frames:
@@ -70,12 +87,19 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
     lower: list[FloatArray] = []
     upper: list[FloatArray] = []
     segments: list[Segment] = []
+    entry_lower: list[FloatArray] = []
+    entry_upper: list[FloatArray] = []
     first = 0
     for leg in legs:
         for stability, z in _parts(tracer, leg, _evenly(system, leg)):
-            low, high = _torque_limits(system, model, leg, z)
+            gradients = gap_gradients(system, system.place(z), leg.formation.array)
+            low, high = _torque_limits(system, model, gradients, z)
             contacts = system.contact_names(leg.formation.pairs)
-            segments.append(Segment(contacts, stability.value, first, first + len(z) - 1))
+            needed = float(model.needed_forces(gradients).max())
+            last = first + len(z) - 1
+            segments.append(Segment(contacts, stability.value, first, last, needed))
+            entry_lower.append(low[0])
+            entry_upper.append(high[0])
             shared = 1 if points else 0
             points.append(z[shared:])
             lower.append(low[shared:])
@@ -89,6 +113,8 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
         np.concatenate(lower),
         np.concatenate(upper),
         tuple(segments),
+        np.array(entry_lower),
+        np.array(entry_upper),
     )
 
 
@@ -141,10 +167,9 @@ def _middles(system: ContactSystem, leg: Leg, before: FloatArray, after: FloatAr
 
 
 def _torque_limits(
-    system: ContactSystem, model: ContactModel, leg: Leg, z: FloatArray
+    system: ContactSystem, model: ContactModel, gradients: FloatArray, z: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Actuator torques that keep a leg's contacts, in N·m, each of shape (s, n)."""
-    gradients = gap_gradients(system, system.place(z), leg.formation.array)
+    """Actuator torques that keep the contacts, in N·m, each of shape (s, n)."""
     lower, upper = model.torque_limits(gradients)
     weight = system.link_weight_torques(z)
     unit = system.force_unit * system.size

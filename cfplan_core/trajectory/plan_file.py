@@ -106,6 +106,7 @@ def _result(document: Document) -> PlanResult:
                 stability=segment['stability'],
                 first_frame=int(segment['first_frame']),
                 last_frame=int(segment['last_frame']),
+                needed_force=segment.get('needed_force'),
             )
             for segment in document['segments']
         ),
@@ -151,15 +152,7 @@ def _document(result: PlanResult, name: str) -> Document:
             }
             for k in range(count)
         ],
-        'segments': [
-            {
-                'contacts': list(segment.contacts),
-                'stability': segment.stability,
-                'first_frame': int(segment.first_frame),
-                'last_frame': int(segment.last_frame),
-            }
-            for segment in result.segments
-        ],
+        'segments': [_segment(segment) for segment in result.segments],
         'statistics': {
             'planning_time': float(statistics.planning_time),
             'initial_tree_nodes': int(statistics.initial_tree_nodes),
@@ -169,6 +162,18 @@ def _document(result: PlanResult, name: str) -> Document:
             'failures': {reason: int(times) for reason, times in statistics.failures.items()},
         },
     }
+
+
+def _segment(segment: Segment) -> Document:
+    document: Document = {
+        'contacts': list(segment.contacts),
+        'stability': segment.stability,
+        'first_frame': int(segment.first_frame),
+        'last_frame': int(segment.last_frame),
+    }
+    if segment.needed_force is not None:
+        document['needed_force'] = float(segment.needed_force)
+    return document
 
 
 def _text(document: Document) -> str:

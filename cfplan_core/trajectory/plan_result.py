@@ -29,12 +29,15 @@ class Segment:
         stability: ``form_closure``, ``force_closure`` or ``second_order``.
         first_frame: Index of the first frame; shared with the segment before.
         last_frame: Index of the last frame; shared with the segment after.
+        needed_force: Largest over its frames of the smallest F such that contact forces of at
+            most F hold the object, in weights of the object; None if not known.
     """
 
     contacts: tuple[str, ...]
     stability: str
     first_frame: int
     last_frame: int
+    needed_force: float | None = None
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,12 @@ class PlanResult:
         segments: Cover all frames; neighbours share a frame.
         statistics: What the search did.
         trees: The two CF-trees, (initial, goal); parents come before children.
+        reversible: True if it is known that the plan can be followed backwards.
+        entry_lower: Shape (s, n), torque limits of each segment at its first frame, N·m, where
+            the frame itself carries those of the segment before. Not in plan files.
+        entry_upper: As `entry_lower`.
+        margin: Worst robustness margin of the plan, where it was chosen among several, else None.
+        alternatives: Other plans, the next best first, each without further ones.
     """
 
     problem: str
@@ -110,8 +119,39 @@ class PlanResult:
     segments: tuple[Segment, ...] = ()
     statistics: Statistics = field(default_factory=Statistics)
     trees: tuple[tuple[TreeNode, ...], tuple[TreeNode, ...]] = ((), ())
+    reversible: bool = False
+    entry_lower: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    entry_upper: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    margin: float | None = None
+    alternatives: tuple[PlanResult, ...] = ()
 
     @property
     def solved(self) -> bool:
         """True if there is a plan."""
         return self.status is Status.SOLVED
+
+    def reversed(self) -> PlanResult:
+        """Return the plan from the goal to the start.
+
+        Each segment's contacts, torque limits and speed are as before, in reverse order; the name
+        stays that of the problem, whose start and goal have changed places.
+
+        Raises:
+            CfplanError: It is not solved, or not known to be reversible: its contact model is
+                not, or it was read from a file.
+        """
+        from cfplan_core.trajectory.reversal import reversed_plan
+
+        return reversed_plan(self)
+
+    @property
+    def length(self) -> float:
+        """Length of the joints' path, rad."""
+        return float(np.linalg.norm(np.diff(self.joints, axis=0), axis=1).sum())
+
+    @property
+    def needed_force(self) -> float | None:
+        """Largest needed force of the plan, in weights of the object; None if not known."""
+        forces = [segment.needed_force for segment in self.segments]
+        known = [force for force in forces if force is not None]
+        return max(known) if known and len(known) == len(forces) else None

@@ -10,6 +10,7 @@ import click
 
 from cfplan_core.command_line.console import INVALID_INPUT, answers, complain
 from cfplan_core.command_line.plan import EXIT_STATUS, finite_seconds, print_result, write_result
+from cfplan_core.command_line.progress import progress_bar
 from cfplan_core.errors import CfplanError
 from cfplan_core.trajectory.plan_result import PlanResult, Status
 from cfplan_ros.command_line.runtime import needs_rclpy
@@ -83,7 +84,8 @@ def call(
     """Send the problem FILE to a running planner and print its answer as `cfplan plan` does.
 
     The planner must have the hand of FILE. What the planner publishes and records is its own
-    affair; the answer says under which name it recorded the run.
+    affair; the answer says under which name it recorded the run. Ctrl-C ends the waiting, not
+    the planner's search.
 
     Exit status: 0 solved, 1 infeasible (searched to the end), 2 invalid input or usage, 3 budget
     exhausted, 4 the planner is not there or could not plan, 130 interrupted.
@@ -110,7 +112,7 @@ def call(
         return NOT_ANSWERED
 
     result = plan_result(response)
-    if result is None:
+    if result is None or response.error_code == response.CANCELED:
         complain(f'{node_name}: {response.error_msg}')
         return NOT_ANSWERED
     return _report(problem, result, response, json_path, figure_directory)
@@ -119,39 +121,60 @@ def call(
 def _answer_to(request: Any, node_name: str, wait: float) -> Any:
     """Call the planner's service; None, with a complaint, if it does not answer."""
     import rclpy
-    from cfplan_msgs.srv import PlanManipulation
-    from rclpy.exceptions import NameValidationException
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.signals import SignalHandlerOptions
 
     # Without handlers of its own Ctrl-C is Python's KeyboardInterrupt, as in every other command.
     context = rclpy.Context()
-    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+        node = rclpy.create_node('cfplan_call', context=context)
+    except (RuntimeError, ValueError) as error:
+        raise CfplanError(str(error)) from error
     executor = SingleThreadedExecutor(context=context)
-    node = rclpy.create_node('cfplan_call', context=context)
     try:
         executor.add_node(node)
-        service = f'/{node_name.strip("/")}/plan'
-        try:
-            client = node.create_client(PlanManipulation, service)
-        except NameValidationException as error:
-            raise CfplanError(f'--node {node_name}: {error}') from error
-        if not client.wait_for_service(timeout_sec=wait):
-            complain(
-                f'no planner offers {service}, waited {wait:g} s; start one with: cfplan node'
-            )
-            return None
-        future = client.call_async(request)
+        with progress_bar() as bar:
+            if bar is not None:
+                bar.add_task(f'{node_name} is planning', total=None)
+            return _call(request, node, executor, node_name, wait)
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+def _call(request: Any, node: Any, executor: Any, node_name: str, wait: float) -> Any:
+    from cfplan_msgs.srv import PlanManipulation
+    from rclpy.exceptions import NameValidationException
+
+    planner = f'/{node_name.strip("/")}'
+    service = f'{planner}/plan'
+    try:
+        client = node.create_client(PlanManipulation, service)
+    except NameValidationException as error:
+        raise CfplanError(f'--node {node_name}: {error}') from error
+    if not client.wait_for_service(timeout_sec=wait):
+        complain(f'no planner offers {service}, waited {wait:g} s; start one with: cfplan node')
+        return None
+    names = [f'{space.rstrip("/")}/{name}' for name, space in node.get_node_names_and_namespaces()]
+    if names.count(planner) > 1:
+        complain(
+            f'{names.count(planner)} planners are called {planner}, and each would plan and '
+            'publish; end all but one, or rename them: --ros-args -r __node:=NAME'
+        )
+        return None
+    future = client.call_async(request)
+    try:
         while not future.done():
             executor.spin_until_future_complete(future, timeout_sec=_POLL_PERIOD)
             if not future.done() and not _still_there(client, executor, future):
                 complain(f'{node_name}: the planner ended without an answer')
                 return None
-        return future.result()
-    finally:
-        executor.shutdown()
-        node.destroy_node()
-        rclpy.shutdown(context=context)
+    except KeyboardInterrupt:
+        complain(f'{node_name} has the request all the same, and will publish what it finds')
+        raise
+    return future.result()
 
 
 def _still_there(client: Any, executor: Any, future: Any) -> bool:

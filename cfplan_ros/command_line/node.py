@@ -12,15 +12,16 @@ from cfplan_ros.command_line.runtime import needs_rclpy
 @click.command(
     short_help='Start the planning node.',
     context_settings={'ignore_unknown_options': True},
-    epilog='Example: cfplan node hand.yaml --ros-args -p record_directory:=runs',
+    epilog='Example: cfplan node problem.yaml --ros-args -p record_directory:=runs',
 )
 @click.argument('file', type=click.Path(path_type=Path), required=False)
 @click.argument('ros_arguments', nargs=-1, type=click.UNPROCESSED, metavar='[--ros-args ...]')
 def node(file: Path | None, ros_arguments: tuple[str, ...]) -> int:
     """Start the planning node and keep it running until Ctrl-C.
 
-    FILE is a problem file: its hand, object and gravity become the node's. Whatever follows
-    --ros-args goes to the node as with ros2 run: remappings, parameters, --params-file.
+    FILE is a problem file: its hand, object and gravity become the node's, whatever other
+    parameters say. All that follows --ros-args goes to the node as with ros2 run: remappings,
+    parameters (a hand alone is given by -p hand_file:=FILE), --params-file.
 
     Exit status: 0 after Ctrl-C or SIGTERM, 2 invalid input or usage.
     """
@@ -30,7 +31,8 @@ def node(file: Path | None, ros_arguments: tuple[str, ...]) -> int:
     if arguments and arguments[0] != '--ros-args':
         raise click.UsageError(f'got {arguments[0]!r}, expected --ros-args after FILE')
     if file is not None:
-        arguments = [*_scene_of(file), *arguments]
+        # Later values win.
+        arguments = [*arguments, *(['--'] if arguments else []), *_scene_of(file)]
 
     with needs_rclpy():
         from cfplan_ros.planner_node import main
@@ -44,4 +46,4 @@ def _scene_of(file: Path) -> list[str]:
     gravity = ', '.join(repr(float(value)) for value in load_problem(file).gravity)
     values = {'hand_file': file, 'object_file': file, 'gravity': f'[{gravity}]'}
     settings = [word for name, value in values.items() for word in ('-p', f'{name}:={value}')]
-    return ['--ros-args', *settings, '--']
+    return ['--ros-args', *settings]

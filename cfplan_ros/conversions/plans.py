@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from array import array
 from dataclasses import replace
 
@@ -121,6 +122,7 @@ def plan_message(result: PlanResult, frame_id: str, stamp: Time) -> Manipulation
             stability=NUMBERS[segment.stability],
             first_point=segment.first_frame,
             last_point=segment.last_frame,
+            needed_force=math.nan if segment.needed_force is None else segment.needed_force,
         )
         for segment in result.segments
     ]
@@ -238,6 +240,7 @@ def _with_frames(result: PlanResult, plan: ManipulationPlan) -> PlanResult:
                 stability=NAMES[segment.stability],
                 first_frame=int(segment.first_point),
                 last_frame=int(segment.last_point),
+                needed_force=(None if math.isnan(segment.needed_force) else segment.needed_force),
             )
             for segment in plan.segments
         ),

@@ -33,7 +33,7 @@ ROUNDING = 1e-3
 
 _TILT = 1e-6
 _ELEMENT = re.compile(r'[ve][0-9]+')
-_NAME = re.compile(r'[^/\\\n\r\t]*[^/\\\s][^/\\\n\r\t]*')
+_NOT_IN_A_NAME = re.compile(r'[/\\\n\r\t]')
 
 
 class RequestReader:
@@ -43,6 +43,7 @@ class RequestReader:
         mapping: The problem; values that are found wrong here are left out of it.
         findings: What is found wrong here, with fields of the request.
         origin: Where the values of the mapping come from.
+        other_hand: True if the request is for another hand; the first finding says so.
     """
 
     def __init__(self, request: PlanManipulation.Request, setup: Setup) -> None:
@@ -53,10 +54,12 @@ class RequestReader:
             setup: What the planner brings.
         """
         self.findings: list[Finding] = []
+        self.other_hand = False
         self._reported: list[str] = []
         self._without_goal = False
         self._setup = setup
         self._compare_digest(request.hand_digest)
+        self._at_most_one_of_each(request)
         start = self._grasp('start', request.start)
         goal = self._grasp('goal', request.goal, start.get('object_pose'))
         self._start_only(request.start)
@@ -65,7 +68,7 @@ class RequestReader:
         self._budget(request)
         self.mapping: dict[str, Any] = {
             'format': 'cfplan/problem/1',
-            'name': request.problem_name if _NAME.fullmatch(request.problem_name) else 'unnamed',
+            'name': request.problem_name if _is_name(request.problem_name) else 'unnamed',
             'gravity': self._gravity(request.gravity),
             'hand': setup.hand,
             'object': self._object(request.object),
@@ -105,9 +108,29 @@ class RequestReader:
                 "the planner's hand", _Said('none'), 'a hand: the planner is not configured'
             )
         elif digest and digest.lower() != self._setup.digest:
+            self.other_hand = True
             self._wrong(
-                'hand_digest', digest, f"{self._setup.digest!r}, the digest of the planner's hand"
+                'hand_digest',
+                digest,
+                f"{self._setup.digest!r}, the digest of the planner's hand; for another hand "
+                'start a planner with it (cfplan node FILE) or set the parameter hand_file',
             )
+
+    def _at_most_one_of_each(self, request: PlanManipulation.Request) -> None:
+        """Refuse more values than a field may hold; not every serializer does."""
+        fields = {
+            'start.object_pose': request.start.object_pose,
+            'start.object_angle': request.start.object_angle,
+            'goal.object_pose': request.goal.object_pose,
+            'goal.object_angle': request.goal.object_angle,
+            'object': request.object,
+            'gravity': request.gravity,
+        }
+        if len(request.object):
+            fields['object[0].center_of_mass'] = request.object[0].center_of_mass
+        for field, values in fields.items():
+            if len(values) > 1:
+                self._wrong(field, _Said(f'{len(values)} values'), 'one value at most')
 
     def _grasp(
         self, field: str, grasp: Grasp, start_pose: Sequence[float] | None = None
@@ -333,6 +356,11 @@ class RequestReader:
             self._wrong(
                 f'{field}.z', float(point.z), '0: bodies move in the plane z = 0', *consequences
             )
+
+
+def _is_name(text: str) -> bool:
+    """Tell whether the format allows a name, in a time that grows with its length only."""
+    return bool(text.strip()) and not _NOT_IN_A_NAME.search(text)
 
 
 class _Said(str):

@@ -46,11 +46,14 @@ def problem_from_request(
 
     Raises:
         InvalidRequestError: With everything that is wrong, also with the grasps as far as they
-            can be judged.
+            can be judged; for another hand than the planner's only with that.
     """
     reader = RequestReader(request, setup)
     if setup.hand is None:
         raise InvalidRequestError(reader.findings)
+    if reader.other_hand:
+        # Nothing else can be said of a request that means another hand.
+        raise InvalidRequestError(reader.findings[:1])
     reading = problem_from_mapping(reader.mapping)
     found = [finding for finding in reading.findings if not reader.reported(finding.field)]
     findings = [*reader.findings, *(as_sent(finding, reader.origin) for finding in found)]

@@ -25,7 +25,7 @@ class MessageWriter:
     """
 
     def __init__(self, stream: IO[bytes], profile: str = PROFILE) -> None:
-        self._writer: Any = Writer(stream, compression=CompressionType.ZSTD)
+        self._writer: Any = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
         self._writer.start(profile=profile, library=f'cfplan {__version__}')
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}

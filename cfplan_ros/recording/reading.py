@@ -14,6 +14,8 @@ from rclpy.serialization import deserialize_message
 
 from cfplan_ros.recording.intact import IntactRecords
 from cfplan_ros.recording.provenance import RECORD
+from cfplan_ros.recording.rewriting import RECOVERY_RECORD
+from cfplan_ros.recording.run_file import lock
 from cfplan_ros.recording.schemas import message_class_of, schema_of
 from cfplan_ros.recording.topics import REQUEST, RESPONSE, full_name
 
@@ -56,8 +58,14 @@ class RunSummary:
     Attributes:
         size: Bytes.
         profile: Of the MCAP header, ``ros2`` for a run.
-        complete: False if its writer did not get to its end, or has not yet.
+        complete: False if its writer did not get to its end, or has not yet, or if anything is
+            damaged.
+        in_use: True if its writer is at work.
+        damage: What is damaged, or was lost, but for a torn end, in words.
+        written: How many messages the file says were written, those torn off its end apart.
         metadata: The record ``cfplan``, see `provenance`; empty for a foreign recording.
+        recovery: The record ``cfplan_recovery``: how many messages were kept, lost and added;
+            empty for a file that was not recovered.
         topics: By name.
         request: The ``PlanManipulation.Request``, or None.
         response: The ``PlanManipulation.Response``, or None.
@@ -68,7 +76,11 @@ class RunSummary:
     size: int
     profile: str
     complete: bool
+    in_use: bool
+    damage: tuple[str, ...]
+    written: int
     metadata: dict[str, str]
+    recovery: dict[str, str]
     topics: tuple[TopicSummary, ...]
     request: Any | None
     response: Any | None
@@ -97,11 +109,13 @@ def read_run(path: Path) -> RunSummary:
     """
     profile = ''
     metadata: dict[str, str] = {}
+    recovery: dict[str, str] = {}
     schemas: dict[int, str] = {}
     channels: dict[int, Channel] = {}
     times: dict[int, list[int]] = {}
     called: dict[str, Message] = {}
     request = response = ''
+    in_use = _in_use(path)
     with path.open('rb') as file:
         records = IntactRecords(file, path)
         for record in records:
@@ -111,6 +125,8 @@ def read_run(path: Path) -> RunSummary:
                 metadata = record.metadata
                 node = metadata.get('node', '')
                 request, response = full_name(REQUEST, node), full_name(RESPONSE, node)
+            elif isinstance(record, Metadata) and record.name == RECOVERY_RECORD:
+                recovery = record.metadata
             elif isinstance(record, Schema):
                 schemas[record.id] = record.name
             elif isinstance(record, Channel):
@@ -138,7 +154,11 @@ def read_run(path: Path) -> RunSummary:
         records.size,
         profile,
         records.complete,
+        in_use,
+        records.damage,
+        records.written,
         metadata,
+        recovery,
         tuple(sorted(topics, key=lambda topic: topic.name)),
         decoded.get(request),
         decoded.get(response),
@@ -170,6 +190,12 @@ def read_messages(path: Path) -> Iterator[tuple[str, int, Any]]:
                 message_class = message_class_of(schemas[channel.schema_id])
                 message = deserialize_message(record.data, message_class)
                 yield channel.topic, record.log_time, message
+
+
+def _in_use(path: Path) -> bool:
+    # The lock goes with this file object at once: others may want to recover the file.
+    with path.open('rb') as file:
+        return lock(file.fileno()) is False
 
 
 def _decoded(record: Message, channel: Channel) -> Any | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from cfplan_core.errors import CfplanError
 from cfplan_ros.recording.intact import NotMcapError
 from cfplan_ros.recording.rewriting import Contents, Preview, missing_preview, rewrite
 from cfplan_ros.recording.run_file import PART, failure_reason, lock, same_file, sync_directory
+from cfplan_ros.recording.wording import counted
 
 _UNREADABLE = '.unreadable'
 
@@ -27,35 +29,41 @@ class Recovery:
 
     Attributes:
         path: The complete file; None if there was nothing to do.
-        kept: Messages that the file held.
+        complete: True if the file was complete already.
+        kept: Messages that can be read in the file.
+        lost: Messages that the file says it held, and that cannot be read.
         added: Messages of the preview that were added.
         dropped: Length of what is torn off at the end, bytes.
         problems: What else went wrong, e.g. why there is no preview.
     """
 
     path: Path | None
+    complete: bool
     kept: int
+    lost: int = 0
     added: int = 0
     dropped: int = 0
     problems: tuple[str, ...] = ()
 
 
 def recover(path: Path, output: Path | None = None, preview: Preview | None = None) -> Recovery:
-    """Write a complete file with all that was flushed of one whose writer died.
+    """Write a complete file with all that is intact of one that is cut short or damaged.
 
     Args:
-        path: A ``.part`` file, or any torn MCAP file.
-        output: Where the complete file goes, and `path` stays; None for where the writer would
+        path: A ``.part`` file, or any MCAP file.
+        output: Where the complete file goes, and `path` stays; missing directories are created.
+            A file that is complete already is copied there. None for where the writer would
             have put it: a ``.part`` becomes that file (a copy of it, ending in ``.unreadable``,
             stays if more than its end is damaged), and of another file ``x.mcap`` the complete
-            one is ``x_recovered.mcap``.
+            one is ``x_recovered.mcap``; nothing is written if that file is complete already.
         preview: Gives what viewers are shown; of a file with a plan, what it lacks is added.
 
     Raises:
         InUseError: The file's writer is alive.
         NotMcapError: The file is no MCAP file, or holds no message.
         CfplanError: The output is there already.
-        OSError: A file cannot be read or written; nothing has changed then.
+        OSError: A file cannot be read, or the complete one, which the error names, cannot be
+            written; neither of the two has changed then.
     """
     with path.open('rb') as file:
         # Where the file system has no locks, whoever asks has to know.
@@ -96,40 +104,49 @@ def recover_left_over(
             log(str(error))
         except OSError as error:
             log(f'not recovered: {failure_reason(error, path)}')
+        # One file, whatever it holds, must not cost the others.
+        except Exception as error:
+            log(f'{path}: not recovered: {type(error).__name__}: {error}')
     return completed
 
 
 def summary(path: Path, recovery: Recovery) -> str:
     """Say in a line what came of a recovery."""
-    if recovery.path is None:
-        return f'{path}: is complete, with {_counted(recovery.kept)}; nothing to recover'
-    parts = [f'{path}: kept {_counted(recovery.kept)}']
+    if recovery.complete and not recovery.added:
+        outcome = f'complete file: {recovery.path}' if recovery.path else 'nothing to recover'
+        return f'{path}: is complete, with {counted(recovery.kept)}; {outcome}'
+    kept = counted(recovery.kept)
+    if recovery.lost:
+        kept = f'{recovery.kept} of {counted(recovery.kept + recovery.lost)}'
+    parts = [f'{path}: kept {kept}']
+    if recovery.lost:
+        parts.append(f'lost {recovery.lost}')
     if recovery.added:
-        parts.append(f'added {_counted(recovery.added)} of the preview')
+        parts.append(f'added {counted(recovery.added)} of the preview')
     if recovery.dropped:
         parts.append(f'dropped the last {recovery.dropped} bytes, which are torn')
     return '; '.join([', '.join(parts), *recovery.problems, f'complete file: {recovery.path}'])
 
 
-def _counted(messages: int) -> str:
-    return f'{messages} message{"" if messages == 1 else "s"}'
-
-
 def _recover(file: BinaryIO, path: Path, output: Path | None, preview: Preview | None) -> Recovery:
     contents = Contents(file, path)
     extent = contents.extent
-    if contents.kept == 0:
+    if extent.kept == 0:
         raise NotMcapError(f'{path}: holds no complete message')
     in_place = output is None and path.name.endswith(PART)
-    if extent.complete and not in_place:
-        return Recovery(None, contents.kept)
+    if extent.complete and output is None and not in_place:
+        return Recovery(None, True, extent.kept)
     target = output or _target(path)
     if target.exists():
         raise CfplanError(f'{target}: is there already, expected the name of a new file')
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if extent.complete and not in_place:
+        _put(lambda out: _copy(file, out), target, None)
+        return Recovery(target, True, extent.kept)
 
     problems = []
-    if extent.damaged_chunks:
-        problems.append(f'{extent.damaged_chunks} chunk(s) left out that fail their checksum')
+    if extent.damage:
+        problems.append(f'damaged: {", ".join(extent.damage)}')
         if in_place:
             problems.append(f'the damaged file is kept as {_unreadable(path).name}')
     added: list[tuple[int, str, Any]] = []
@@ -140,43 +157,51 @@ def _recover(file: BinaryIO, path: Path, output: Path | None, preview: Preview |
         except Exception as error:
             problems.append(f'no preview added: {type(error).__name__}: {error}')
     recovery = Recovery(
-        target, contents.kept, len(added), extent.size - extent.intact, tuple(problems)
+        target,
+        extent.complete,
+        extent.kept,
+        max(extent.written - extent.kept, 0),
+        len(added),
+        extent.dropped,
+        tuple(problems),
     )
-    _put(contents, added, recovery, path if in_place and not extent.damaged_chunks else None)
-    if in_place and extent.damaged_chunks:
+    note = {
+        'kept_messages': str(recovery.kept),
+        'lost_messages': str(recovery.lost),
+        'added_messages': str(recovery.added),
+        'dropped_bytes': str(recovery.dropped),
+    }
+    replaced = path if in_place and not extent.damage else None
+    _put(lambda out: rewrite(contents, added, note, out), target, replaced)
+    if in_place and extent.damage:
         _set_aside(path)
     return recovery
 
 
-def _put(
-    contents: Contents,
-    added: list[tuple[int, str, Any]],
-    recovery: Recovery,
-    replaced: Path | None,
-) -> None:
+def _copy(file: BinaryIO, out: BinaryIO) -> None:
+    file.seek(0)
+    shutil.copyfileobj(file, out)
+
+
+def _put(write: Callable[[BinaryIO], None], target: Path, replaced: Path | None) -> None:
     """Write the complete file under another name first, then move it to its place."""
-    target = recovery.path
-    assert target is not None
     temporary = target.with_name(f'{target.name}.tmp')
-    note = {
-        'kept_messages': str(recovery.kept),
-        'added_messages': str(recovery.added),
-        'dropped_bytes': str(recovery.dropped),
-    }
     try:
         with temporary.open('wb') as out:
-            rewrite(contents, added, note, out)
+            write(out)
+            out.flush()
             os.fsync(out.fileno())
         if replaced is not None:
             # Over the torn file first: there is one of the two at any instant, never both.
             os.replace(temporary, replaced)
             temporary = replaced
         os.replace(temporary, target)
-    except OSError:
+    except OSError as error:
         if temporary != replaced:
             with suppress(OSError):
                 temporary.unlink()
-        raise
+        # The user knows the file by the name that it should have got.
+        raise OSError(error.errno, error.strerror, str(target)) from error
     sync_directory(target.parent)
 
 

@@ -35,19 +35,17 @@ class Contents:
 
     Attributes:
         profile: Of the file's header.
-        kept: Number of messages.
         metadata: The record that says how to run again; empty if there is none.
         node: Fully qualified name of the node that recorded.
         plan: The last plan, serialized; empty if there is none.
         times: Log times by topic, ns, of a run of cfplan.
-        extent: How far the file is intact.
+        extent: How much of the file is intact.
     """
 
     def __init__(self, file: BinaryIO, path: Path) -> None:
         self._file = file
         self._path = path
         self.profile = PROFILE
-        self.kept = 0
         self.metadata: dict[str, str] = {}
         self.node = ''
         self.plan = b''
@@ -63,7 +61,6 @@ class Contents:
             elif isinstance(record, Channel):
                 channels[record.id] = record.topic
             elif isinstance(record, Message):
-                self.kept += 1
                 topic = channels[record.channel_id]
                 if self.node:
                     self.times.setdefault(topic, set()).add(record.log_time)

@@ -7,6 +7,8 @@ each message, so that a viewer replaces what it shows.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from cfplan_msgs.msg import ManipulationPlan
 from std_msgs.msg import Header
@@ -155,12 +157,27 @@ class ContactPainter:
                 )
         return markers
 
-    def caption(self, contacts: Contacts, segment: int, header: Header) -> Marker:
-        """Say which segment of the plan is shown, and its stability and forces."""
+    def caption(
+        self,
+        contacts: Contacts,
+        segment: int,
+        limits: Mapping[str, tuple[float, float]],
+        header: Header,
+    ) -> Marker:
+        """Say which segment of the plan is shown, its stability and forces, and torque limits.
+
+        Args:
+            contacts: At the instant that is shown.
+            segment: Number of the segment, from zero.
+            limits: Smallest and largest torque of each joint, N·m.
+            header: In the world frame.
+        """
         style = stability_style(self._segments[segment].stability)
         words = f'{segment + 1} of {len(self._segments)}: {style.label}'
         if np.isfinite(contacts.forces).all() and len(contacts.forces):
             words += f', forces up to {contacts.forces.max():.3g} N'
+        for joint, (lower, upper) in limits.items():
+            words += f'\n{joint} {_torque(lower)} to {_torque(upper)} N·m'
         return text(header, 'segment', self._caption_place, words, colour(INK), self._sizes)
 
     def removals(self, kept: list[Marker], header: Header) -> list[Marker]:
@@ -172,3 +189,7 @@ class ContactPainter:
             for ns, number in [('contacts', 0), *all_arrows]
             if (ns, number) not in present
         ]
+
+
+def _torque(value: float) -> str:
+    return f'{value:.3g}' if np.isfinite(value) else 'unbounded'

@@ -15,13 +15,8 @@ from cfplan_core.model import Grasp, Problem
 from cfplan_core.report.scene import segment_at
 from cfplan_core.trajectory.plan_result import Segment
 from cfplan_ros.conversions.contacts import contact_names
+from cfplan_ros.conversions.stabilities import NAMES
 from cfplan_ros.conversions.times import nanoseconds_of
-
-_STABILITY = {
-    PlanSegment.FORM_CLOSURE: 'form_closure',
-    PlanSegment.FORCE_CLOSURE: 'force_closure',
-    PlanSegment.SECOND_ORDER: 'second_order',
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +124,6 @@ def read_motion(problem: Problem, plan: ManipulationPlan) -> Motion:
 
 
 def _segment(segment: PlanSegment) -> Segment:
-    stability = _STABILITY.get(segment.stability, '')
+    stability = NAMES.get(segment.stability, '')
     contacts = contact_names(segment.contact_formation)
     return Segment(contacts, stability, segment.first_point, segment.last_point)

@@ -79,7 +79,11 @@ def preview(
         if shown is None or not shown <= present:
             markers += painter.removals(markers, header)
         shown = present
-        markers.append(painter.caption(contacts, motion.segment_of[k], header))
+        bounds = plan.torque_limits.points[k]
+        limits = dict(
+            zip(hand.joint_names, zip(bounds.lower, bounds.upper, strict=True), strict=True)
+        )
+        markers.append(painter.caption(contacts, motion.segment_of[k], limits, header))
         yield time, CONTACT_MARKERS, MarkerArray(markers=markers)
 
         yield (
@@ -88,6 +92,6 @@ def preview(
             JointTorqueLimits(
                 header=Header(stamp=stamp),
                 joint_names=list(hand.joint_names),
-                points=[plan.torque_limits.points[k]],
+                points=[bounds],
             ),
         )

@@ -334,6 +334,11 @@ def test_polygon_of_too_many_vertices_is_found():
     assert 'a list of 3 to 10000 items' in finding.expected
 
 
+def test_plan_is_told_from_a_problem_without_more_ado():
+    finding = only_finding((('format',), 'cfplan/plan/1'))
+    assert finding.value == 'a plan (cfplan/plan/1)'
+
+
 # Names, joints and contacts
 
 

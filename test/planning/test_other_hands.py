@@ -55,6 +55,46 @@ def test_third_finger_is_put_on_top_of_the_block() -> None:
     certify(problem, plan(problem))
 
 
+def test_pose_a_step_away_is_driven_to_where_four_joints_leave_room() -> None:
+    problem = four_joints((0.0005, 0.0, 0.0))
+    certify(problem, plan(problem, PlanOptions(time_budget=20.0)))
+
+
+def four_joints(pose: tuple[float, float, float]) -> Problem:
+    """Two fingers of two joints pinch a block that stands on the palm; a goal of a pose only."""
+    thick = 0.004
+    fingers = []
+    for name, side, low, high in (('thumb', -1, 0.0, thick), ('index', 1, -thick, 0.0)):
+        links = [
+            Link(f'link_{k}', length, [(0.0, low), (length, low), (length, high), (0.0, high)])
+            for k, length in enumerate((0.03, 0.045))
+        ]
+        joints = [
+            Joint(f'{name}_0', 0.0, 3.1, 2.0, 1.0),
+            Joint(f'{name}_1', -2.5, 2.5, 2.0, 1.0),
+        ]
+        fingers.append(Finger(name, (side * 0.06, 0.0), 0.0, tuple(joints), tuple(links)))
+    block = ManipulatedObject([(-HALF, 0.0), (HALF, 0.0), (HALF, 0.04), (-HALF, 0.04)], 0.05)
+    # Of the upper link, at 1.4 rad, the lower one bends back to the block's upper corner.
+    bend = _bend_to(complex(-HALF, 0.04), complex(-0.06, 0.0), 1.4)
+    start = Grasp((0.0, 0.0, 0.0), (1.4, bend, math.pi - 1.4, -bend))
+    return Problem(
+        'four_joints',
+        (0.0, -9.81),
+        Hand((TABLE,), tuple(fingers)),
+        block,
+        0.0,
+        start,
+        Goal(object_pose=pose),
+    )
+
+
+def _bend_to(corner: complex, base: complex, turn: float) -> float:
+    """Angle of the second joint at which the second link's lower edge runs through a corner."""
+    elbow = base + 0.03 * np.exp(1j * turn)
+    return float(np.angle(corner - elbow)) - turn
+
+
 def thumb_problem() -> tuple[Problem, Callable[[float, float], Grasp]]:
     """A third finger above the block, and grasps with it lifted by an angle from the top."""
     length = 0.061

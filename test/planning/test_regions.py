@@ -15,6 +15,7 @@ from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Goal, Problem
 from cfplan_core.planner import PlanOptions, plan
 from cfplan_core.planning.pieces import Region
+from cfplan_core.planning.regions import Regions
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.tracing import classify
 from cfplan_core.verification import verify_plan
@@ -29,7 +30,9 @@ def leaning_block() -> Problem:
 
 def roadmap_of(problem: Problem) -> tuple[ContactSystem, Roadmap]:
     system = ContactSystem(problem)
-    return system, Roadmap(system, FrictionlessModel(system.load))
+    roadmap = Roadmap(system, FrictionlessModel(system.load))
+    roadmap.regions = Regions(roadmap)
+    return system, roadmap
 
 
 def loose(x: float, clearance: float) -> tuple[float, float]:
@@ -41,10 +44,11 @@ def loose(x: float, clearance: float) -> tuple[float, float]:
 def beside(seed: int) -> list[Region]:
     """Regions that the curves of a random problem border on, of which one contact is open."""
     explored = explore(random_problem(seed))
+    regions = explored.roadmap.regions = Regions(explored.roadmap)
     found: list[Region] = []
     for piece in explored.pieces:
         if piece.dimension == 1:
-            for _, region in explored.roadmap.regions.beside(piece):
+            for _, region in regions.beside(piece):
                 assert isinstance(region, Region)
                 found.append(region)
     return list(dict.fromkeys(found))

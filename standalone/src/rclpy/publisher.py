@@ -10,6 +10,7 @@ from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle, RCLError
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
+from ros_standalone.middleware.errors import ClosedError
 
 if TYPE_CHECKING:
     from rclpy.callback_groups import CallbackGroup
@@ -76,7 +77,13 @@ class Publisher(Generic[MessageT]):
             raise TypeError(f'Expected {self.msg_type}, got {type(msg)}')
         if not self._context.ok():
             raise RCLError("Failed to publish: publisher's context is invalid")
-        self._writer.publish(data)
+        try:
+            self._writer.publish(data)
+        except ClosedError:
+            # Another thread has destroyed the publisher since.
+            raise InvalidHandle(
+                'cannot use Destroyable because destruction was requested'
+            ) from None
 
     def get_subscription_count(self) -> int:
         """Return how many subscriptions receive what is published."""

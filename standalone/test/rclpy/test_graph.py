@@ -36,8 +36,8 @@ def test_a_topic_is_listed_with_its_type(node):
 
 def test_publishers_and_subscriptions_are_counted_by_expanded_name(node):
     node.create_publisher(Int32, '~/numbers', 1)
-    node.create_subscription(Int32, '~/numbers', print, 1)
-    node.create_subscription(Int32, '~/numbers', print, 1)
+    node.create_subscription(Int32, '~/numbers', lambda _: None, 1)
+    node.create_subscription(Int32, '~/numbers', lambda _: None, 1)
     eventually(
         node,
         lambda: (node.count_publishers('~/numbers'), node.count_subscribers('~/numbers')),
@@ -46,7 +46,7 @@ def test_publishers_and_subscriptions_are_counted_by_expanded_name(node):
 
 
 def test_servers_and_clients_are_counted(node):
-    node.create_service(Trigger, 'x', print)
+    node.create_service(Trigger, 'x', lambda _: None)
     node.create_client(Trigger, 'x')
     node.create_client(Trigger, 'x')
     eventually(node, lambda: (node.count_services('x'), node.count_clients('x')), (1, 2))
@@ -54,10 +54,10 @@ def test_servers_and_clients_are_counted(node):
 
 def test_what_a_node_has_is_listed_by_kind(node):
     other = rclpy.create_node('other', enable_rosout=False, start_parameter_services=False)
-    other.create_subscription(Int32, 'in', print, 1)
+    other.create_subscription(Int32, 'in', lambda _: None, 1)
     other.create_publisher(Int32, 'out', 1)
     other.create_client(Trigger, 'asked')
-    other.create_service(Trigger, 'offered', print)
+    other.create_service(Trigger, 'offered', lambda _: None)
     eventually(
         node,
         lambda: node.get_subscriber_names_and_types_by_node('other', '/'),
@@ -102,7 +102,7 @@ def test_an_endpoint_is_told_with_node_type_and_qos(node):
 
 
 def test_subscriptions_are_told_by_dds_name_if_asked_for(node):
-    node.create_subscription(Int32, 'numbers', print, 1)
+    node.create_subscription(Int32, 'numbers', lambda _: None, 1)
     eventually(
         node, lambda: len(node.get_subscriptions_info_by_topic('rt/numbers', no_mangle=True)), 1
     )

@@ -11,7 +11,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 SPIN = """
-import sys, rclpy
+import sys, time, rclpy
 from rclpy.executors import ExternalShutdownException
 rclpy.init(args=[])
 node = rclpy.create_node('signalled')
@@ -20,6 +20,10 @@ try:
     rclpy.spin(node)
     print('returned')
 except BaseException as error:
+    # A thread of rclpy's shuts the context down at the same time.
+    deadline = time.monotonic() + 10.0
+    while rclpy.ok() and time.monotonic() < deadline:
+        time.sleep(0.01)
     print(type(error).__name__, rclpy.ok())
 """
 

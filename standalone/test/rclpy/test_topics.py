@@ -131,7 +131,7 @@ def test_all_is_acknowledged_when_nobody_listens(node):
 
 
 def test_a_subscription_counts_its_publishers(node, until):
-    subscription = node.create_subscription(Int32, 'numbers', print, 10)
+    subscription = node.create_subscription(Int32, 'numbers', lambda _: None, 10)
     node.create_publisher(Int32, 'numbers', 10)
     node.create_publisher(Int32, 'numbers', 10)
     until(lambda: subscription.get_publisher_count() == 2)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -17,16 +18,34 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 TIMEOUT = 60.0
+FIRST_PORT, PORTS_PER_DOMAIN = 7410, 250
+
+
+@pytest.fixture(scope='session')
+def free_domain() -> Iterator[int]:
+    """A domain in which nobody is on this machine, kept for this test run.
+
+    The first participant of a domain listens on a port of its own. Who has that port has the
+    domain: the participants of the tests take the next ports.
+    """
+    for domain_id in (1 + (os.getpid() + step) % 100 for step in range(100)):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
+            try:
+                holder.bind(('', FIRST_PORT + PORTS_PER_DOMAIN * domain_id))
+            except OSError:
+                continue
+            yield domain_id
+            return
+    pytest.fail('every domain from 1 to 100 is in use on this machine')
 
 
 @pytest.fixture(autouse=True)
-def domain(monkeypatch: pytest.MonkeyPatch) -> int:
-    """A domain of this test run, with the discovery that users get by default."""
-    domain_id = 1 + os.getpid() % 100
-    monkeypatch.setenv('ROS_DOMAIN_ID', str(domain_id))
+def domain(free_domain: int, monkeypatch: pytest.MonkeyPatch) -> int:
+    """The domain of this test run, with the discovery that users get by default."""
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(free_domain))
     for name in ('CYCLONEDDS_URI', 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_STATIC_PEERS'):
         monkeypatch.delenv(name, raising=False)
-    return domain_id
+    return free_domain
 
 
 class WorkerProcess:

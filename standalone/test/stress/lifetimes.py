@@ -1,7 +1,7 @@
 """Another process of the stress tests: begins and ends rclpy many times; prints what that cost.
 
-The arguments are the name of a function of this module and the number of times. A hang ends it
-with the stacks of all threads.
+The arguments are the name of a function of this module, 'busy' or 'idle', which is what its node
+is meanwhile, and the number of times. A hang ends it with the stacks of all threads.
 """
 
 from __future__ import annotations
@@ -31,21 +31,38 @@ from std_srvs.srv import Trigger
 WAIT = 10.0
 HANG = 50.0
 WARM_UP = 10
+THREADS_AT_REST = 2  # this one and faulthandler's
 
 
-def busy_node(on_message: Callable[[Any], Any]) -> Node:
-    """A node with one of everything, that sends messages to itself."""
-    node = rclpy.create_node('busy')
-    publisher = node.create_publisher(Int64, 'numbers', 10)
-    node.create_subscription(Int64, 'numbers', on_message, 10)
-    node.create_timer(0.001, lambda: publisher.publish(Int64(data=1)))
+def make_node(idle: bool, on_event: Callable[..., Any]) -> Node:
+    """A node that has something to do all the time, or only once."""
+    node = rclpy.create_node('node')
     node.create_service(Trigger, 'trigger', lambda _, response: response)
     node.create_client(Trigger, 'trigger')
+    if idle:
+        node.create_guard_condition(on_event).trigger()
+        return node
+    publisher = node.create_publisher(Int64, 'numbers', 10)
+    node.create_subscription(Int64, 'numbers', lambda _: on_event(), 10)
+
+    def publish() -> None:
+        # A shutdown destroys the publisher, also while another thread is about to use it.
+        with contextlib.suppress(RuntimeError):
+            publisher.publish(Int64(data=1))
+
+    node.create_timer(0.001, publish)
     return node
 
 
 def used() -> dict[str, float]:
-    """Open descriptors, threads and memory [MB] of this process."""
+    """Open descriptors, threads and memory [MB] of this process, once its threads have ended."""
+    ending = [thread for thread in threading.enumerate() if thread is not threading.main_thread()]
+    for thread in ending:
+        thread.join(WAIT)
+    # The system may count a thread for a moment that Python has done with.
+    end = time.monotonic() + WAIT
+    while len(os.listdir('/proc/self/task')) > THREADS_AT_REST and time.monotonic() < end:
+        time.sleep(0.001)
     pages = int(Path('/proc/self/statm').read_text().split()[1])
     return {
         'descriptors': len(os.listdir('/proc/self/fd')),
@@ -54,37 +71,38 @@ def used() -> dict[str, float]:
     }
 
 
-def use_once() -> None:
-    arrived = threading.Event()
+def use_once(idle: bool) -> None:
+    happened = threading.Event()
     rclpy.init(args=[])
-    node = busy_node(lambda _: arrived.set())
-    while not arrived.is_set():
+    node = make_node(idle, happened.set)
+    while not happened.is_set():
         rclpy.spin_once(node, timeout_sec=WAIT)
     rclpy.shutdown()
 
 
-def shut_down_a_context_that_a_thread_spins() -> None:
-    shut_down_while(rclpy.spin, rclpy.shutdown)
+def shut_down_a_context_that_a_thread_spins(idle: bool) -> None:
+    rclpy.init(args=[])
+    shut_down_while(idle, rclpy.spin, rclpy.shutdown)
 
 
-def shut_down_a_context_that_a_pool_spins() -> None:
+def shut_down_a_context_that_a_pool_spins(idle: bool) -> None:
     rclpy.init(args=[])
     executor = MultiThreadedExecutor(4)
-    shut_down_while(executor_spin(executor), rclpy.shutdown)
+    shut_down_while(idle, executor_spin(executor), rclpy.shutdown)
     assert executor.shutdown(WAIT)
 
 
-def shut_down_an_executor_that_a_thread_spins() -> None:
+def shut_down_an_executor_that_a_thread_spins(idle: bool) -> None:
     rclpy.init(args=[])
     executor = SingleThreadedExecutor()
-    shut_down_while(executor_spin(executor), lambda: executor.shutdown(WAIT))
+    shut_down_while(idle, executor_spin(executor), lambda: executor.shutdown(WAIT))
     rclpy.shutdown()
 
 
-def shut_down_an_executor_that_a_pool_spins() -> None:
+def shut_down_an_executor_that_a_pool_spins(idle: bool) -> None:
     rclpy.init(args=[])
     executor = MultiThreadedExecutor(4)
-    shut_down_while(executor_spin(executor), lambda: executor.shutdown(WAIT))
+    shut_down_while(idle, executor_spin(executor), lambda: executor.shutdown(WAIT))
     rclpy.shutdown()
 
 
@@ -96,11 +114,11 @@ def executor_spin(executor: Executor) -> Callable[[Node], None]:
     return spin
 
 
-def shut_down_while(spin: Callable[[Node], None], shut_down: Callable[[], Any]) -> None:
-    if not rclpy.ok():
-        rclpy.init(args=[])
-    arrived = threading.Event()
-    node = busy_node(lambda _: arrived.set())
+def shut_down_while(
+    idle: bool, spin: Callable[[Node], None], shut_down: Callable[[], Any]
+) -> None:
+    happened = threading.Event()
+    node = make_node(idle, happened.set)
 
     def spin_to_the_end() -> None:
         with contextlib.suppress(ExternalShutdownException):
@@ -108,7 +126,7 @@ def shut_down_while(spin: Callable[[Node], None], shut_down: Callable[[], Any]) 
 
     thread = threading.Thread(target=spin_to_the_end)
     thread.start()
-    assert arrived.wait(WAIT)
+    assert happened.wait(WAIT)
     shut_down()
     thread.join(WAIT)
     assert not thread.is_alive()
@@ -116,17 +134,13 @@ def shut_down_while(spin: Callable[[Node], None], shut_down: Callable[[], Any]) 
 
 def main() -> None:
     faulthandler.dump_traceback_later(HANG, exit=True)
-    live, count = globals()[sys.argv[1]], int(sys.argv[2])
+    live, idle, count = globals()[sys.argv[1]], sys.argv[2] == 'idle', int(sys.argv[3])
     for _ in range(WARM_UP):
-        live()
+        live(idle)
     before = used()
     for _ in range(count):
-        live()
-    # A thread that was told to end may still be at it.
-    end = time.monotonic() + WAIT
-    while (after := used())['threads'] > before['threads'] and time.monotonic() < end:
-        time.sleep(0.01)
-    print(json.dumps([before, after]))
+        live(idle)
+    print(json.dumps([before, used()]))
 
 
 if __name__ == '__main__':

@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 
-def live(what, count):
+def live(what, pace, count):
     """Run a function of lifetimes.py so often; returns what was in use before and after."""
+    program = str(Path(__file__).with_name('lifetimes.py'))
     run = subprocess.run(
-        [sys.executable, str(Path(__file__).with_name('lifetimes.py')), what, str(count)],
+        [sys.executable, program, what, pace, str(count)],
         capture_output=True,
         text=True,
         timeout=60.0,
@@ -23,15 +24,16 @@ def live(what, count):
 
 
 def test_init_and_shutdown_leave_nothing_behind():
-    before, after = live('use_once', 50)
-    assert after['descriptors'] == before['descriptors']
-    assert after['threads'] == before['threads']
+    before, after = live('use_once', 'busy', 50)
+    assert after['descriptors'] <= before['descriptors']
+    assert after['threads'] <= before['threads']
     assert after['memory'] < before['memory'] + 5.0
 
 
+@pytest.mark.parametrize('pace', ['busy', 'idle'])
 @pytest.mark.parametrize('what', ['a_context', 'an_executor'])
 @pytest.mark.parametrize('who', ['a_thread', 'a_pool'])
-def test_what_spins_ends_when_it_is_shut_down_from_another_thread(what, who):
-    before, after = live(f'shut_down_{what}_that_{who}_spins', 40)
-    assert after['descriptors'] == before['descriptors']
-    assert after['threads'] == before['threads']
+def test_what_spins_ends_when_another_thread_shuts_it_down(pace, what, who):
+    before, after = live(f'shut_down_{what}_that_{who}_spins', pace, 25)
+    assert after['descriptors'] <= before['descriptors']
+    assert after['threads'] <= before['threads']

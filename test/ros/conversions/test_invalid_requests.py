@@ -271,11 +271,9 @@ def test_everything_that_is_wrong_is_found_at_once_in_the_order_of_the_codes() -
         put('goal.frame_id', 'world'),
         put('goal.joints.position', [NAN, NAN]),
         put('start.joints.velocity', [0.0]),
-        put('hand_digest', 'another'),
     )
     error = refused(request)
     assert [finding.field for finding in error.findings] == [
-        'hand_digest',
         'start.joints.velocity',
         'goal.joints.position[0]',
         'goal.joints.position[1]',
@@ -284,7 +282,26 @@ def test_everything_that_is_wrong_is_found_at_once_in_the_order_of_the_codes() -
         'options.time_budget',
         'goal.frame_id',
     ]
+    assert error.code == Response.INVALID_START
+
+
+def test_of_a_request_for_another_hand_nothing_else_is_said() -> None:
+    error = refused(edited(put('hand_digest', 'another'), put('object.0.mass', 0.0)))
+    assert [finding.field for finding in error.findings] == ['hand_digest']
     assert error.code == Response.HAND_MISMATCH
+
+
+@pytest.mark.parametrize('part', ['start.object_pose', 'goal.object_angle', 'object', 'gravity'])
+def test_two_values_where_one_may_be_are_refused(part: str) -> None:
+    request = edited()
+    owner: Any = request
+    *path, field = part.split('.')
+    for name in path:
+        owner = getattr(owner, name)
+    values = list(getattr(owner, field))
+    setattr(owner, field, [*values, *values])
+    (finding,) = refused(request).findings
+    assert (finding.field, finding.value) == (part, '2 values')
 
 
 def test_the_message_has_a_line_for_each_finding() -> None:

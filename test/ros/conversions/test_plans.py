@@ -87,6 +87,7 @@ def plans(draw: st.DrawFn) -> PlanResult:
             draw(st.sampled_from(STABILITIES)),
             first,
             last,
+            draw(st.none() | st.floats(0.0, 1e6)),
         )
         for first, last in zip(ends, ends[1:] or ends, strict=False)
     ]

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -146,6 +147,13 @@ def test_a_name_that_no_file_has_reaches_the_plan_and_not_the_data(name: str) ->
     request = request_from_problem(replace(STORY, name=name))
     assert problem_from_request(request, SETUP)[0].name == name
     assert problem_mapping(request, SETUP)['name'] == 'unnamed'
+
+
+def test_a_very_long_name_is_judged_at_once() -> None:
+    request = request_from_problem(replace(STORY, name='a' * 100_000 + '/'))
+    began = time.perf_counter()
+    assert problem_mapping(request, SETUP)['name'] == 'unnamed'
+    assert time.perf_counter() - began < 2.0
 
 
 def test_object_and_gravity_are_the_planners_where_the_request_has_none() -> None:

@@ -29,6 +29,8 @@ from cfplan_ros.conversions.requests import request_from_problem
 from cfplan_ros.planner_node import PlannerNode
 
 REPOSITORY = Path(__file__).parents[3]
+# Without a solution, which takes a tenth of a second to find out.
+INFEASIBLE_FILE = REPOSITORY / 'config' / 'problems' / 'existence' / 'barrier_too_low.yaml'
 STORY_FILE = REPOSITORY / 'config' / 'problems' / 'trinkle_hunter_1991.yaml'
 # Parallel test runs on one machine do not hear each other.
 DOMAIN = 1 + os.getpid() % 100

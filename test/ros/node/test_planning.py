@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import statistics
 import time
-from array import array
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Duration
 from rclpy.executors import MultiThreadedExecutor
-from ros.node.harness import Client, Code, Planner, story, story_request
+from ros.node.harness import (
+    INFEASIBLE_FILE,
+    Client,
+    Code,
+    Planner,
+    story,
+    story_request,
+)
 from ros.node.slow_search import slow_hand_file, slow_request
 
-from cfplan_core import plan
+from cfplan_core import load_problem, plan
 from cfplan_ros.conversions.plans import plan_result
+from cfplan_ros.conversions.requests import request_from_problem
 
 Start = Callable[..., Planner]
 
@@ -49,8 +55,9 @@ def test_object_of_the_planner_is_taken_where_the_request_brings_none(
     assert client.plan(request).error_code == Code.NONE
 
 
-def test_goal_out_of_reach_is_infeasible(planner: Planner, client: Client) -> None:
-    response = client.plan(out_of_reach())
+def test_problem_without_a_solution_is_infeasible(start_planner: Start, client: Client) -> None:
+    start_planner(hand_file=str(INFEASIBLE_FILE))
+    response = client.plan(request_from_problem(load_problem(INFEASIBLE_FILE)))
     assert response.error_code == Code.INFEASIBLE
     assert 'explored' in response.error_msg
     assert not response.plan.joint_trajectory.points
@@ -92,13 +99,6 @@ def test_planner_without_object_is_not_configured_for_a_request_without(
     request = story_request()
     request.object = []
     assert client.plan(request).error_code == Code.NOT_CONFIGURED
-
-
-def out_of_reach() -> Any:
-    request = story_request('out of reach')
-    request.goal.object_pose[0].position.y = 0.5
-    request.goal.joints.name, request.goal.joints.position = [], array('d')
-    return request
 
 
 # More than one thing at a time.

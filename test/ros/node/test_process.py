@@ -164,7 +164,7 @@ def test_planner_says_in_diagnostics_what_it_did(run_node: Run, client: Client) 
     response = client.plan(story_request('turned'))
     values = client.planner_state(lambda values: values.get('last problem') == 'turned')
     assert values['state'] == 'idle'
-    assert values['last outcome'] == 'NONE'
+    assert values['last outcome'] == 'SOLVED'
     _, recorder = client.status('recorder', lambda status: True)
     assert recorder['directory'] == 'runs'
     assert recorder['last file'] == response.record

@@ -63,6 +63,18 @@ def test_run_holds_request_answer_plan_markers_and_the_plan_played_in_time(
     }
 
 
+def test_run_holds_no_command_that_was_not_published(
+    planner: Planner, client: Client, tmp_path: Path
+) -> None:
+    """Whoever plays the run to a controller must not move a hand that was not to be moved."""
+    response = client.plan(story_request(plan_only=True))
+    file = tmp_path / 'runs' / response.record
+    eventually(file.exists, f'{file} is not completed')
+    topics = set(message_counts(file))
+    assert '/cfplan_planner/plan_result' in topics
+    assert not topics & {'/cfplan_planner/joint_trajectory', '/cfplan_planner/torque_limits'}
+
+
 def message_counts(file: Path) -> dict[str, int]:
     with file.open('rb') as stream:
         summary = make_reader(stream).get_summary()

@@ -226,12 +226,12 @@ def test_wrong_request_is_answered_with_code_and_field(
 
 def test_everything_that_is_wrong_is_said_at_once(served: Client) -> None:
     request = story_request()
-    request.hand_digest = 'ab' * 32
+    request.start.joints.velocity = [0.0]
     request.object[0].mass = -1.0
     request.goal.object_pose = [Pose(position=Point(z=1.0))]
     response = served.plan(request)
-    assert response.error_code == Code.HAND_MISMATCH
-    for field in ('hand_digest', 'goal.object_pose[0].position.z', 'object[0].mass'):
+    assert response.error_code == Code.INVALID_START
+    for field in ('start.joints.velocity', 'goal.object_pose[0].position.z', 'object[0].mass'):
         assert field in response.error_msg
 
 

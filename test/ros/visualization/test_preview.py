@@ -147,6 +147,20 @@ def test_dots_touch_object_and_hand(planned: Planned) -> None:
         assert np.abs(found[:, None] - vertices).min(axis=1).max() < 1e-9
 
 
+def test_caption_names_the_torque_limits_of_the_instant(planned: Planned) -> None:
+    names, result = planned.result.joint_names, planned.result
+    for k, (_, message) in enumerate(by_topic(planned)[CONTACT_MARKERS]):
+        (caption,) = [m for m in message.markers if m.ns == 'segment']
+        said = dict(line.split(' ', 1) for line in caption.text.splitlines()[1:])
+        assert tuple(said) == names
+        for name, lower, upper in zip(
+            names, result.torque_lower[k], result.torque_upper[k], strict=True
+        ):
+            low, high = said[name].removesuffix(' N·m').split(' to ')
+            assert low == (f'{lower:.3g}' if np.isfinite(lower) else 'unbounded')
+            assert high == (f'{upper:.3g}' if np.isfinite(upper) else 'unbounded')
+
+
 def test_arrows_add_up_to_the_weight_to_one_scale(planned: Planned) -> None:
     problem, segments = planned.problem, planned.result.segments
     weight = problem.object.mass * float(np.hypot(*problem.gravity))

@@ -99,19 +99,6 @@ def definition(type_name: str) -> MessageDefinition | ServiceDefinition:
     ]
 
 
-def message_definition(type_name: str) -> MessageDefinition:
-    """The parse tree of a message, request, response or event.
-
-    Raises:
-        InterfaceNotFoundError: There is no such message.
-        InterfaceFormatError: Its file cannot be read.
-    """
-    found = definition(type_name)
-    if not isinstance(found, MessageDefinition):
-        raise InterfaceNotFoundError(f'{type_name!r} is a service; expected a message')
-    return found
-
-
 def split_type_name(type_name: str) -> tuple[str, str, str]:
     """Split ``std_msgs/msg/String`` into package, kind and name.
 

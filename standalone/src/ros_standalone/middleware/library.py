@@ -114,7 +114,6 @@ create_guard_condition = _function('dds_create_guardcondition', _entity, _entity
 create_waitset = _function('dds_create_waitset', _entity, _entity)
 delete = _function('dds_delete', _result, _entity)
 get_guid = _function('dds_get_guid', _result, _entity, ctypes.POINTER(Guid))
-get_qos = _function('dds_get_qos', _result, _entity, _pointer)
 
 write = _function('dds_write', _result, _entity, ctypes.POINTER(Sample))
 take_next = _function(

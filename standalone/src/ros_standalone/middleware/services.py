@@ -51,16 +51,6 @@ class _Pair(Entity):
         self._reader = reader
         self._writer = writer
 
-    @property
-    def reader_gid(self) -> bytes:
-        """Identifier of its reader, 16 bytes."""
-        return self._reader.gid
-
-    @property
-    def writer_gid(self) -> bytes:
-        """Identifier of its writer, 16 bytes."""
-        return self._writer.gid
-
     def _delete(self) -> None:
         self._writer.close()
         self._reader.close()

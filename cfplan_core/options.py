@@ -1,0 +1,116 @@
+"""What a caller asks of a plan, besides that it solves the problem."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from cfplan_core.errors import CfplanError
+from cfplan_core.geometry.polygon import is_flat, signed_area
+
+RESOLUTION = 0.05
+"""Spacing of the grid of joint angles that regions are filled over unless asked otherwise, rad."""
+
+
+class Preference(str, Enum):
+    """Which of several plans is the best; `docs/optimality.md` says how each is measured."""
+
+    FIRST = 'first'
+    FEWEST_SEGMENTS = 'fewest-segments'
+    SHORTEST = 'shortest'
+    ROBUST = 'robust'
+
+
+@dataclass(frozen=True)
+class PlanOptions:
+    """Limits of a search, and of the plans that it may find.
+
+    Attributes:
+        time_budget: Seconds, or None for no limit.
+        max_nodes: Nodes of both trees together, or None for no limit.
+        resolution: Spacing of the grid of joint angles, rad, over which contact formations of
+            dimension 2 are explored; for hands of two joints. With constraints, preferences or
+            alternatives they are explored along rays instead.
+        max_needed_force: Largest force, in weights of the object, that the contacts may need to
+            hold it in any frame of the plan, or None for no limit.
+        max_contacts: Largest number of contacts in any configuration that is passed through, also
+            in an instant, or None for no limit. A vertex on a vertex counts as two.
+        forbidden: Contact formations, as names of contacts: nowhere may all contacts of one of
+            them touch at once.
+        required: Contact formations: for each, the plan passes through one that contains it.
+        held_joints: Names of joints that do not move.
+        stay_within: Corners (x, y) of a convex polygon, m, that the object stays inside.
+        prefer: Which plan to choose; unless it is the first one found, the search goes on until no
+            better one can exist or a budget is exhausted.
+        alternatives: Number of plans wanted, with different sequences of contact formations.
+    """
+
+    time_budget: float | None = None
+    max_nodes: int | None = None
+    resolution: float = RESOLUTION
+    max_needed_force: float | None = None
+    max_contacts: int | None = None
+    forbidden: tuple[tuple[str, ...], ...] = ()
+    required: tuple[tuple[str, ...], ...] = ()
+    held_joints: tuple[str, ...] = ()
+    stay_within: tuple[tuple[float, float], ...] | None = None
+    prefer: Preference = Preference.FIRST
+    alternatives: int = 1
+
+    @property
+    def optimal(self) -> bool:
+        """True if the first plan found is not enough."""
+        chosen = self.prefer is not Preference.FIRST
+        return chosen or self.alternatives > 1 or bool(self.required)
+
+    def __post_init__(self) -> None:
+        if self.time_budget is not None and not self.time_budget > 0.0:
+            raise CfplanError(f'time_budget: got {self.time_budget}, expected seconds above zero')
+        if self.max_nodes is not None and not self.max_nodes > 0:
+            raise CfplanError(f'max_nodes: got {self.max_nodes}, expected a number above zero')
+        if not 1e-3 <= self.resolution <= 1.0:
+            raise CfplanError(f'resolution: got {self.resolution}, expected 0.001 to 1 rad')
+        force = self.max_needed_force
+        if force is not None and not (math.isfinite(force) and force > 0.0):
+            raise CfplanError(f'max_needed_force: got {force}, expected weights above zero')
+        if self.max_contacts is not None and not self.max_contacts > 0:
+            raise CfplanError(
+                f'max_contacts: got {self.max_contacts}, expected a number above zero'
+            )
+        if not self.alternatives > 0:
+            raise CfplanError(
+                f'alternatives: got {self.alternatives}, expected a number above zero'
+            )
+        for field in ('forbidden', 'required'):
+            if any(isinstance(names, str) or not names for names in getattr(self, field)):
+                raise CfplanError(
+                    f'{field}: got {getattr(self, field)!r}, expected contact formations, each a '
+                    'sequence of at least one name of a contact'
+                )
+        try:
+            object.__setattr__(self, 'prefer', Preference(self.prefer))
+        except ValueError:
+            choices = ', '.join(choice.value for choice in Preference)
+            raise CfplanError(f'prefer: got {self.prefer!r}, expected one of {choices}') from None
+        if self.stay_within is not None:
+            _refuse_no_region(self.stay_within)
+
+
+def _refuse_no_region(corners: tuple[tuple[float, float], ...]) -> None:
+    """Refuse what is not a convex polygon, counter-clockwise."""
+    expected = 'expected at least three corners (x, y) of a convex polygon, counter-clockwise'
+    if len(corners) < 3 or any(len(corner) != 2 for corner in corners):
+        raise CfplanError(f'stay_within: got {corners!r}, {expected}')
+    polygon = np.array(corners, dtype=float)
+    if not np.isfinite(polygon).all() or is_flat(polygon) or not signed_area(polygon) > 0.0:
+        raise CfplanError(f'stay_within: got {corners!r}, {expected}')
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    after = np.roll(edges, -1, axis=0)
+    turns = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
+    # A star's turns are all to the left as well, but they add up to more than one.
+    angles = np.arctan2(turns, (edges * after).sum(axis=1))
+    if (turns < 0.0).any() or angles.sum() > 2.0 * np.pi + 1e-6:
+        raise CfplanError(f'stay_within: got {corners!r}, {expected}')
