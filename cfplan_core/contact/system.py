@@ -204,6 +204,11 @@ class ContactSystem:
         center = np.array([x + c * com[0] - s * com[1], y + s * com[0] + c * com[1]]) / self.size
         return np.concatenate([center, [phi], grasp.joints])
 
+    @property
+    def whole(self) -> ContactSystem:
+        """The system with all joints: itself."""
+        return self
+
     def reduced(self, z: FloatArray) -> FloatArray:
         """Leave out what is held of configurations of the whole system: nothing here."""
         return z

@@ -69,7 +69,7 @@ class Expedition:
         start: FloatArray,
         goal: FloatArray | GoalTest,
         grown: Callable[[int, int], None] = lambda initial, goal: None,
-        seed: int = 0,
+        seed: int | Sequence[int] = 0,
         most_drives: int = 20000,
     ) -> None:
         """Root the trees.
@@ -90,7 +90,8 @@ class Expedition:
         self.drives = 0
         self.meeting: int | None = None
         self._test = goal if isinstance(goal, GoalTest) else None
-        self._pusher = Pusher(roadmap.tracer, roadmap.failures, self._region_of)
+        refusal = roadmap.constraints.refusal
+        self._pusher = Pusher(roadmap.tracer, roadmap.failures, self._region_of, refusal)
         roots = [start] if isinstance(goal, GoalTest) else [start, goal]
         self._growths = [Growth() for _ in roots]
         for growth, root in zip(self._growths, roots, strict=True):
@@ -262,11 +263,13 @@ class Expedition:
         return begin, ToConfiguration(wanted, weights, free), on_edges
 
     def _fingers(self) -> list[IntArray]:
-        """Columns of z of each finger's joints."""
-        found, first = [], 3
+        """Columns of z of each finger's joints; not of fingers all of whose joints are held."""
+        found = []
         for finger in self._system.problem.hand.fingers:
-            found.append(np.arange(first, first + len(finger.joints)))
-            first += len(finger.joints)
+            own = {joint.name for joint in finger.joints}
+            moving = [k for k, name in enumerate(self._system.joint_names) if name in own]
+            if moving:
+                found.append(3 + np.array(moving, dtype=np.intp))
         return found
 
     def _nearest(self, growth: Growth, wanted: FloatArray, scale: FloatArray) -> Milestone:
@@ -305,8 +308,12 @@ class Expedition:
         known.append(region)
         return region
 
-    def path(self) -> list[Leg]:
-        """Legs from start to goal; only after `run` returned true."""
+    def path(self, shorten: bool = True) -> list[Leg]:
+        """Legs from start to goal; only after `run` returned true.
+
+        Args:
+            shorten: False to leave detours as they are.
+        """
         assert self._met is not None
         initial = Growth.chain(self._met[0])
         stops: list[Stop] = [(initial[0], ())]
@@ -315,7 +322,8 @@ class Expedition:
             goal = Growth.chain(self._met[1])[::-1]
             for before, stop in pairwise(goal):
                 stops.append((stop, _backwards(before)))
-        pieces = [piece for _, motion in self._shortened(stops) for piece in motion]
+        stops = self._shortened(stops) if shorten else stops
+        pieces = [piece for _, motion in stops for piece in motion]
         return self._legs(pieces)
 
     def _shortened(self, stops: list[Stop]) -> list[Stop]:
