@@ -39,8 +39,6 @@ _JOINT = 0.1
 _TRIED = 0.15
 # Joined if a push ends this near to a configuration of the other tree.
 _MET = 1e-7
-# Configurations of the other tree among which a new one finds its partner.
-_PARTNERS = 6
 # Poses of the object, in radians and object sizes, that count as the same.
 _SAME_POSE = 1e-8
 # Fingers are moved one by one where the object's poses differ by no more than this.
@@ -195,8 +193,6 @@ class Expedition:
 
     def _regrasp(self, side: int, begin: Milestone, target: Milestone) -> bool:
         """Change the fingers' places to those of a configuration of the other tree."""
-        if not self._regrasping.possible(begin.around, target.around):
-            return False
         chain, _ = self._regrasping.join(begin, target)
         for reached in chain:
             self._add(side, reached)
@@ -207,14 +203,7 @@ class Expedition:
         other = self._growths[1 - side]
         off = np.linalg.norm((other.table - new.z) * self._scale, axis=1)
         off += self._mismatch(other, self._bodies(new))
-        order = np.argsort(off, kind='stable')
-        for index in order[:_PARTNERS]:
-            partner = other.milestones[int(index)]
-            if float(np.abs(partner.z - new.z)[:3].max()) > _GAIT:
-                break
-            if self._regrasping.possible(new.around, partner.around):
-                return partner
-        return other.milestones[int(order[0])]
+        return other.milestones[int(np.argmin(off))]
 
     def _mismatch(self, growth: Growth, bodies: tuple[int, ...]) -> FloatArray:
         """How much farther away milestones, shape (m,), count as other bodies touch there."""

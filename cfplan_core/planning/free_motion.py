@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfplan_core.contact.gaps import gap_gradients
-from cfplan_core.contact.system import ContactSystem, IntArray
+from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.clearance import Clearance
 
@@ -35,7 +35,8 @@ class FreeMotion:
             joints: Indices of the finger's joints.
         """
         self._system = system
-        self._joints = joints
+        self.joints = joints
+        self._alone = Clearance(system, joints, alone=True)
         self.columns: IntArray = 3 + joints
         self._clearance = Clearance(system, joints)
         self._lower, self._upper = system.lower[joints], system.upper[joints]
@@ -77,6 +78,10 @@ class FreeMotion:
         first = 1 if not len(left) else 0
         return way[first:] if len(made) else np.delete(way, -2, axis=0)[first:]
 
+    def alone(self, z: FloatArray) -> BoolArray:
+        """In which configurations, shape (s, 3 + n), no body but of other fingers is in the way."""
+        return np.asarray(self._alone.distances(z).min(axis=1, initial=np.inf) > _KEPT)
+
     def _lifted(
         self, z: FloatArray, pairs: IntArray, rng: np.random.Generator
     ) -> FloatArray | None:
@@ -95,17 +100,16 @@ class FreeMotion:
                 continue
             for lift in _LIFTS:
                 lifted = z.copy()
-                lifted[self.columns] += lift * direction
-                if self._within(lifted[self.columns]) and self._free(lifted[None])[0]:
+                lifted[self.columns] = np.clip(
+                    z[self.columns] + lift * direction, self._lower, self._upper
+                )
+                if self._free(lifted[None])[0]:
                     return lifted
         return None
 
-    def _within(self, angles: FloatArray) -> bool:
-        return bool((angles >= self._lower).all() and (angles <= self._upper).all())
-
-    def _free(self, z: FloatArray) -> FloatArray:
+    def _free(self, z: FloatArray) -> BoolArray:
         """Which configurations, shape (s, 3 + n), keep clear of everything, shape (s,)."""
-        return np.asarray(self._clearance.distances(z).min(axis=1) > _KEPT)
+        return np.asarray(self._clearance.distances(z).min(axis=1, initial=np.inf) > _KEPT)
 
     def _reached(self, z: FloatArray, begin: FloatArray, end: FloatArray) -> FloatArray:
         """Farthest angles on a straight line from free ones that are free up to there."""

@@ -1,15 +1,14 @@
 """Change the places of fingers, one after the other, while the object is at rest.
 
 Two grasps of one pose of the object are joined finger by finger. Each finger is where the first
-grasp has it, where the other has it, or parked out of the way; of all combinations of these those
-count in which no two bodies overlap and the contacts hold the object, also while a finger is on
-its way. The shortest sequence of moves is tried, and another one where a finger finds no way.
+grasp has it, where the other has it, parked out of the way, or at one of some other places on the
+object. The shortest sequence of moves (`cfplan_core.planning.exchange`) is tried, and another one
+where a finger finds no way.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator
+from itertools import combinations
 
 import numpy as np
 
@@ -20,26 +19,24 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel
 from cfplan_core.planning.clearance import Clearance
 from cfplan_core.planning.drives import ToConfiguration
+from cfplan_core.planning.exchange import Exchange, Place
 from cfplan_core.planning.free_motion import FreeMotion
 from cfplan_core.planning.milestones import Milestone
 from cfplan_core.planning.parking import parked_postures
 from cfplan_core.planning.pushing import Pusher
-from cfplan_core.planning.transitions import Surroundings
+from cfplan_core.planning.touching_postures import TouchingPostures
 
 # A grasp that a finger leaves to the others is stable by this much.
-_HELD = 0.005
+_HELD = 1e-3
 # Samples of a finger's way, and ways that are looked for in one change of grasp.
-_MOST_SAMPLES = 60
-_MOST_WAYS = 14
+_MOST_SAMPLES = 300
+_MOST_WAYS = 24
 _SAME_JOINTS = 1e-7
-# Parked postures of a finger.
+# Places of a finger where it is parked, and where it touches elsewhere than in both grasps.
 _PARKED = 2
+_ELSEWHERE = 14
 # Bodies that overlap by less may be parted by rounding, in object sizes.
 _OVERLAP = 1e-6
-
-# Where each finger is: 0 as in the first grasp, 1 as in the last, then its parked postures.
-Places = tuple[int, ...]
-
 
 class Regrasping:
     """Changes of grasp at rest."""
@@ -60,6 +57,7 @@ class Regrasping:
         self._rng = rng
         self._motions: list[FreeMotion] = []
         self._parked: list[FloatArray] = []
+        self._touching: list[TouchingPostures] = []
         # Which finger each contact is of; -1 for the palm.
         self._finger_of = np.full(system.contact_count, -1, dtype=np.intp)
         first = 0
@@ -69,17 +67,12 @@ class Regrasping:
             moved = system.moves[system.pair_body[: system.contact_count]][:, joints].any(axis=1)
             self._finger_of[moved] = index
             self._motions.append(FreeMotion(system, joints))
+            self._touching.append(TouchingPostures(system, joints))
             self._parked.append(parked_postures(system, joints, begin, end, _PARKED, rng))
-        self._clearance = Clearance(system, np.arange(system.joint_count))
-
-    def possible(self, begin: Surroundings, end: Surroundings) -> bool:
-        """Tell whether there is an order in which the object is held all the time.
-
-        Args:
-            begin: What touches in the first grasp; wrenches count as if its pose were the other's.
-            end: What touches in the last one.
-        """
-        return _Exchange(self, begin, end, np.ones((3,) * len(self._motions), bool)).exists()
+        self._between = {
+            (one, two): Clearance(system, first.joints, second.joints)
+            for (one, first), (two, second) in combinations(enumerate(self._motions), 2)
+        }
 
     def join(self, begin: Milestone, end: Milestone) -> tuple[list[Milestone], bool]:
         """Change from one grasp to another of the same pose.
@@ -92,61 +85,76 @@ class Regrasping:
             The grasps on the way, the other one last, and true; what was reached, and false, if
             the change was not found.
         """
-        postures = self._postures(begin, end)
-        exchange = _Exchange(self, begin.around, end.around, self._apart(begin, postures))
+        places = [self._places(begin, end, finger) for finger in range(len(self._motions))]
+        palm = end.around.gradients[self._finger_of[end.around.pairs] < 0]
+
+        def apart(one: int, two: int) -> BoolArray:
+            return self._apart(begin.z, one, places[one], two, places[two])
+
+        exchange = Exchange(places, palm, apart, self._holds)
+        state = tuple(int(np.array_equal(own[0].angles, own[1].angles)) for own in places)
         chain: list[Milestone] = []
-        at, ways = begin, 0
-        places = tuple(int(np.array_equal(own[0], own[1])) for own in postures)
-        while ways < _MOST_WAYS:
-            moves = exchange.shortest(places)
-            if moves is None:
-                return chain, False
+        at = begin
+        moves = exchange.moves(state)
+        for _ in range(_MOST_WAYS):
             if not moves:
-                return chain, True
+                break
             finger, place = moves[0]
-            ways += 1
-            made = (begin, end)[place].around.pairs if place < 2 else np.empty(0, dtype=np.intp)
-            made = made[self._finger_of[made] == finger]
-            reached = self._move(at, finger, postures[finger][place], made)
-            if not reached:
-                exchange.blocked.add((places, finger, place))
-                continue
-            chain += reached
-            at = reached[-1]
-            places = (*places[:finger], place, *places[finger + 1 :])
-        return chain, False
+            reached = self._move(at, finger, places[finger][place])
+            if reached:
+                chain += reached
+                at = reached[-1]
+                state = (*state[:finger], place, *state[finger + 1 :])
+                moves = moves[1:]
+            else:
+                exchange.blocked.add((state, finger, place))
+                moves = exchange.moves(state)
+        return chain, moves == []
 
-    def _postures(self, begin: Milestone, end: Milestone) -> list[FloatArray]:
-        """Angles of each finger in the first grasp, in the last one, and parked."""
-        return [
-            np.concatenate([begin.z[None, m.columns], end.z[None, m.columns], parked])
-            for m, parked in zip(self._motions, self._parked, strict=True)
-        ]
+    def _places(self, begin: Milestone, end: Milestone, finger: int) -> list[Place]:
+        """Where a finger may be: as in the first grasp, the last one, parked, elsewhere."""
+        columns = self._motions[finger].columns
+        places = []
+        for grasp in (begin, end):
+            own = self._finger_of[grasp.around.pairs] == finger
+            pairs = frozenset(grasp.around.pairs[own].tolist())
+            places.append(Place(grasp.z[columns], pairs, grasp.around.gradients[own]))
+        z = np.tile(begin.z, (len(self._parked[finger]), 1))
+        z[:, columns] = self._parked[finger]
+        free = self._motions[finger].alone(z)
+        nothing = np.empty((0, self._system.dof))
+        places += [Place(row[columns], frozenset(), nothing) for row in z[free]]
+        around = np.array([place.angles for place in places])
+        drawn = self._touching[finger].draw(begin.z, around, _ELSEWHERE, self._rng)
+        for angles, pair, gradient in zip(*drawn, strict=True):
+            places.append(Place(angles, frozenset({int(pair)}), gradient[None]))
+        return places
 
-    def _apart(self, begin: Milestone, postures: list[FloatArray]) -> BoolArray:
-        """Which combinations of places leave no two bodies overlapping."""
-        shape = tuple(len(own) for own in postures)
-        combinations = np.indices(shape).reshape(len(shape), -1)
-        z = np.tile(begin.z, (combinations.shape[1], 1))
-        for motion, own, chosen in zip(self._motions, postures, combinations, strict=True):
-            z[:, motion.columns] = own[chosen]
-        return np.asarray((self._clearance.distances(z) > -_OVERLAP).all(axis=1).reshape(shape))
+    def _apart(
+        self, z: FloatArray, one: int, first: list[Place], two: int, second: list[Place]
+    ) -> BoolArray:
+        """At which places two fingers do not overlap, shape (p, q)."""
+        a, b = np.indices((len(first), len(second))).reshape(2, -1)
+        points = np.tile(z, (len(a), 1))
+        points[:, self._motions[one].columns] = np.array([p.angles for p in first])[a]
+        points[:, self._motions[two].columns] = np.array([p.angles for p in second])[b]
+        nearest = self._between[one, two].distances(points).min(axis=1, initial=np.inf)
+        return np.asarray((nearest > -_OVERLAP).reshape(len(first), len(second)))
 
-    def _move(
-        self, at: Milestone, finger: int, angles: FloatArray, made: IntArray
-    ) -> list[Milestone]:
+    def _move(self, at: Milestone, finger: int, place: Place) -> list[Milestone]:
         """Move one finger; nothing if there is no way."""
         system, motion = self._system, self._motions[finger]
         own = self._finger_of[at.around.pairs] == finger
         left = at.around.pairs[own]
+        made = np.array(sorted(place.pairs), dtype=np.intp)
         goal = at.z.copy()
-        goal[motion.columns] = angles
-        goal = self._touching(goal, made, motion.columns)
-        if len(made) and set(made.tolist()) == set(left.tolist()):
+        goal[motion.columns] = place.angles
+        goal = self._closed(goal, made, motion.columns)
+        if place.pairs and place.pairs == set(left.tolist()):
             slid = self._slide(at, goal, motion.columns)
             if slid:
                 return slid
-        if not self.holds(at.around.gradients[~own]):
+        if not self._holds(at.around.gradients[~own]):
             return []
         if at.around.together[np.ix_(~own, ~own)].any():
             return []
@@ -157,7 +165,7 @@ class Regrasping:
         reached = self._pusher.along(at, formation, way)
         if reached is None:
             return []
-        touched = set(formation.pairs) | set(made.tolist())
+        touched = set(formation.pairs) | place.pairs
         return [reached] if set(reached.around.pairs.tolist()) == touched else []
 
     def _slide(self, at: Milestone, goal: FloatArray, columns: IntArray) -> list[Milestone]:
@@ -169,7 +177,7 @@ class Regrasping:
         arrived = bool(chain) and np.abs(chain[-1].z - goal).max() < _SAME_JOINTS
         return chain if arrived else []
 
-    def _touching(self, z: FloatArray, pairs: IntArray, columns: IntArray) -> FloatArray:
+    def _closed(self, z: FloatArray, pairs: IntArray, columns: IntArray) -> FloatArray:
         """Take up by some columns what rounding left of gaps."""
         if len(pairs):
             placed = self._system.place(z[None])
@@ -178,83 +186,8 @@ class Regrasping:
             z[columns] -= np.linalg.lstsq(rows, gap, rcond=1e-6)[0]
         return z
 
-    def holds(self, gradients: FloatArray) -> bool:
+    def _holds(self, gradients: FloatArray) -> bool:
         """Tell whether contacts with gradients of shape (k, 3 + n) hold the object well."""
         if len(gradients) < 3:
             return False
         return bool(self._model.margins(gradients[None]).stable[0] > _HELD)
-
-    def rows(self, around: Surroundings) -> list[FloatArray]:
-        """Gradients of the contacts of each finger, and of the palm last."""
-        of = self._finger_of[around.pairs]
-        return [around.gradients[of == f] for f in (*range(len(self._motions)), -1)]
-
-    def pairs(self, around: Surroundings) -> list[frozenset[int]]:
-        """Contacts of each finger."""
-        of = self._finger_of[around.pairs]
-        return [
-            frozenset(around.pairs[of == f].tolist()) for f in range(len(self._motions))
-        ]
-
-
-class _Exchange:
-    """The graph of where fingers may be between two grasps."""
-
-    def __init__(
-        self, regrasping: Regrasping, begin: Surroundings, end: Surroundings, apart: BoolArray
-    ) -> None:
-        self._regrasping = regrasping
-        self._apart = apart
-        first, last = regrasping.rows(begin), regrasping.rows(end)
-        self._palm = last[-1]
-        self._rows = list(zip(first[:-1], last[:-1], strict=True))
-        same = zip(regrasping.pairs(begin), regrasping.pairs(end), strict=True)
-        self._slides = [bool(before) and before == after for before, after in same]
-        self._held: dict[Places, bool] = {}
-        self.blocked: set[tuple[Places, int, int]] = set()
-
-    def exists(self) -> bool:
-        """Tell whether the last grasp can be reached from the first."""
-        return self.shortest((0,) * len(self._rows)) is not None
-
-    def shortest(self, begin: Places) -> list[tuple[int, int]] | None:
-        """Fewest moves to the last grasp, each a finger and its new place; None if it cannot be."""
-        end = (1,) * len(begin)
-        before: dict[Places, tuple[Places, tuple[int, int]] | None] = {begin: None}
-        waiting = deque([begin])
-        while waiting and end not in before:
-            places = waiting.popleft()
-            for finger, place in self._moves(places):
-                after = (*places[:finger], place, *places[finger + 1 :])
-                if after not in before:
-                    before[after] = places, (finger, place)
-                    waiting.append(after)
-        if end not in before:
-            return None
-        moves = []
-        step = before[end]
-        while step is not None:
-            moves.append(step[1])
-            step = before[step[0]]
-        return moves[::-1]
-
-    def _moves(self, places: Places) -> Iterator[tuple[int, int]]:
-        """Moves of one finger that the other contacts and the room allow."""
-        for finger, at in enumerate(places):
-            held = self._holds_without(places, finger)
-            for place in range(self._apart.shape[finger]):
-                after = (*places[:finger], place, *places[finger + 1 :])
-                slides = self._slides[finger] and {at, place} == {0, 1}
-                if place == at or not self._apart[after] or not (held or slides):
-                    continue
-                if (places, finger, place) not in self.blocked:
-                    yield finger, place
-
-    def _holds_without(self, places: Places, finger: int) -> bool:
-        # All parked postures hold alike, and the finger's own place does not matter.
-        key = tuple(min(place, 2) for place in places)
-        key = (*key[:finger], 2, *key[finger + 1 :])
-        if key not in self._held:
-            rows = [self._rows[f][place] for f, place in enumerate(key) if place < 2]
-            self._held[key] = self._regrasping.holds(np.concatenate([self._palm, *rows]))
-        return self._held[key]
