@@ -90,12 +90,14 @@ class Exchange:
                     before[side][after] = state
                     grown.append(after)
                     if after in before[1 - side]:
-                        return _moves_of(_chain(before[0], after)[::-1] + _chain(before[1], after)[1:])
+                        return _moves_of(
+                            _chain(before[0], after)[::-1] + _chain(before[1], after)[1:]
+                        )
             border[side] = grown
         return None
 
     def _neighbours(self, state: State, backwards: bool) -> Iterator[State]:
-        """States that differ in the place of one finger, which may go there, or come from there."""
+        """States that a move of one finger leads to, or backwards those that it leads from."""
         for finger, at in enumerate(state):
             held = self._holds_without(state, finger)
             own = self._places[finger]

@@ -178,7 +178,10 @@ class Expedition:
             return False
         target = self._partner(side, new)
         at = new
-        for drive in (self._towards(target), *self._gait(target)):
+        drives: list[Drive] = self._gait(target)
+        if not self._regrasping.useful:
+            drives.insert(0, self._towards(target))
+        for drive in drives:
             on_edges = bool(self._rng.random() < 0.5)
             for reached in self._push(at, drive, on_edges):
                 self._add(side, reached)

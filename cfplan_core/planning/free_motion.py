@@ -79,7 +79,7 @@ class FreeMotion:
         return way[first:] if len(made) else np.delete(way, -2, axis=0)[first:]
 
     def alone(self, z: FloatArray) -> BoolArray:
-        """In which configurations, shape (s, 3 + n), no body but of other fingers is in the way."""
+        """Which configurations, shape (s, 3 + n), keep clear of all but other fingers."""
         return np.asarray(self._alone.distances(z).min(axis=1, initial=np.inf) > _KEPT)
 
     def _lifted(

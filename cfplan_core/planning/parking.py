@@ -1,4 +1,4 @@
-"""Where free fingers are out of the way: postures far from all that the object may pass through."""
+"""Where free fingers are out of the way: postures far from where the object may pass."""
 
 from __future__ import annotations
 

@@ -38,6 +38,7 @@ _ELSEWHERE = 14
 # Bodies that overlap by less may be parted by rounding, in object sizes.
 _OVERLAP = 1e-6
 
+
 class Regrasping:
     """Changes of grasp at rest."""
 
@@ -73,6 +74,11 @@ class Regrasping:
             (one, two): Clearance(system, first.joints, second.joints)
             for (one, first), (two, second) in combinations(enumerate(self._motions), 2)
         }
+
+    @property
+    def useful(self) -> bool:
+        """True if there are fingers enough that two may hold the object while others move."""
+        return len(self._motions) > 2
 
     def join(self, begin: Milestone, end: Milestone) -> tuple[list[Milestone], bool]:
         """Change from one grasp to another of the same pose.
@@ -143,7 +149,7 @@ class Regrasping:
 
     def _move(self, at: Milestone, finger: int, place: Place) -> list[Milestone]:
         """Move one finger; nothing if there is no way."""
-        system, motion = self._system, self._motions[finger]
+        motion = self._motions[finger]
         own = self._finger_of[at.around.pairs] == finger
         left = at.around.pairs[own]
         made = np.array(sorted(place.pairs), dtype=np.intp)

@@ -77,7 +77,7 @@ class TouchingPostures:
         points = np.tile(z, (_DRAWN, 1))
         points[:, self._columns] = np.clip(angles, lower, upper)
         luck = rng.random((_DRAWN, len(self._pairs)))
-        every, length = np.arange(_DRAWN), system.pair_length[self._pairs]
+        length = system.pair_length[self._pairs]
         gap, offset = gaps(system, system.place(points), self._pairs)
         inside = (offset > _INSIDE) & (offset < length - _INSIDE)
         chosen = np.argmin(np.where(inside, np.abs(gap) + 0.3 * luck, np.inf), axis=1)
