@@ -163,6 +163,15 @@ class ContactSystem:
         self.pair_length = self.edge_length[self.pair_edge]
 
     @cached_property
+    def finger_joints(self) -> tuple[IntArray, ...]:
+        """Indices among `joint_names` of each finger's joints, but those that are held."""
+        index = {name: k for k, name in enumerate(self.joint_names)}
+        return tuple(
+            np.array([index[j.name] for j in f.joints if j.name in index], dtype=np.intp)
+            for f in self.problem.hand.fingers
+        )
+
+    @cached_property
     def _index_of_contact(self) -> dict[ElementalContact, int]:
         return {self.contact(k): k for k in range(self.contact_count)}
 

@@ -27,6 +27,7 @@ from cfplan_core.planning.milestones import Growth, Milestone, Stretch
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.placing import placements
 from cfplan_core.planning.pushing import Pusher
+from cfplan_core.planning.regrasping import Regrasping
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.search import Leg, Node, Tree
 from cfplan_core.planning.tracing import classify
@@ -38,8 +39,8 @@ _JOINT = 0.1
 _TRIED = 0.15
 # Joined if a push ends this near to a configuration of the other tree.
 _MET = 1e-7
-# Configurations of the other tree that a new one is pushed towards.
-_NEAREST = 1
+# Poses of the object, in radians and object sizes, that count as the same.
+_SAME_POSE = 1e-8
 # Fingers are moved one by one where the object's poses differ by no more than this.
 _GAIT = 0.5
 # How much farther away a configuration counts for every body that touches in one only.
@@ -92,6 +93,14 @@ class Expedition:
         self._test = goal if isinstance(goal, GoalTest) else None
         refusal = roadmap.constraints.refusal
         self._pusher = Pusher(roadmap.tracer, roadmap.failures, self._region_of, refusal)
+        self._regrasping = Regrasping(
+            self._system,
+            roadmap.model,
+            self._pusher,
+            start,
+            start if isinstance(goal, GoalTest) else goal,
+            self._rng,
+        )
         roots = [start] if isinstance(goal, GoalTest) else [start, goal]
         self._growths = [Growth() for _ in roots]
         for growth, root in zip(self._growths, roots, strict=True):
@@ -165,25 +174,40 @@ class Expedition:
         return True
 
     def _connect(self, side: int, new: Milestone) -> bool:
-        """Push from a new configuration to the nearest of the other tree, all the way."""
+        """Go from a new configuration to one of the other tree, all the way."""
         if len(self._growths) < 2:
             return False
+        target = self._partner(side, new)
+        at = new
+        drives: list[Drive] = self._gait(target)
+        if not self._regrasping.useful:
+            drives.insert(0, self._towards(target))
+        for drive in drives:
+            on_edges = bool(self._rng.random() < 0.5)
+            for reached in self._push(at, drive, on_edges):
+                self._add(side, reached)
+                if self._arrived(side, reached):
+                    return True
+                at = reached
+            if float(np.abs(at.z - target.z)[:3].max()) > _GAIT:
+                break
+            if float(np.abs(at.z - target.z)[:3].max()) < _SAME_POSE:
+                return self._regrasp(side, at, target)
+        return False
+
+    def _regrasp(self, side: int, begin: Milestone, target: Milestone) -> bool:
+        """Change the fingers' places to those of a configuration of the other tree."""
+        chain, _ = self._regrasping.join(begin, target)
+        for reached in chain:
+            self._add(side, reached)
+        return bool(chain) and self._arrived(side, chain[-1])
+
+    def _partner(self, side: int, new: Milestone) -> Milestone:
+        """Configuration of the other tree that a new one may be joined to most easily."""
         other = self._growths[1 - side]
         off = np.linalg.norm((other.table - new.z) * self._scale, axis=1)
         off += self._mismatch(other, self._bodies(new))
-        for index in np.argsort(off, kind='stable')[:_NEAREST]:
-            target = other.milestones[int(index)]
-            at = new
-            for drive in (self._towards(target), *self._gait(target)):
-                on_edges = bool(self._rng.random() < 0.5)
-                for reached in self._push(at, drive, on_edges):
-                    self._add(side, reached)
-                    if self._arrived(side, reached):
-                        return True
-                    at = reached
-                if float(np.abs(at.z - target.z)[:3].max()) > _GAIT:
-                    break
-        return False
+        return other.milestones[int(np.argmin(off))]
 
     def _mismatch(self, growth: Growth, bodies: tuple[int, ...]) -> FloatArray:
         """How much farther away milestones, shape (m,), count as other bodies touch there."""
@@ -264,13 +288,7 @@ class Expedition:
 
     def _fingers(self) -> list[IntArray]:
         """Columns of z of each finger's joints; not of fingers all of whose joints are held."""
-        found = []
-        for finger in self._system.problem.hand.fingers:
-            own = {joint.name for joint in finger.joints}
-            moving = [k for k, name in enumerate(self._system.joint_names) if name in own]
-            if moving:
-                found.append(3 + np.array(moving, dtype=np.intp))
-        return found
+        return [3 + joints for joints in self._system.finger_joints if len(joints)]
 
     def _nearest(self, growth: Growth, wanted: FloatArray, scale: FloatArray) -> Milestone:
         off = np.linalg.norm((growth.table - wanted) * scale, axis=1)

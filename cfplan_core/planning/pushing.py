@@ -26,7 +26,7 @@ from cfplan_core.planning.milestones import Milestone, Stretch
 from cfplan_core.planning.pieces import SAME, Region
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.steering import COMFORT, Helm
-from cfplan_core.planning.tracing import Tracer
+from cfplan_core.planning.tracing import Trace, Tracer
 from cfplan_core.planning.transitions import Surroundings, surroundings
 
 # Ways out of a configuration that are tried, the best first.
@@ -41,6 +41,8 @@ _BESIDE = 0.02
 _EXCURSION = 0.15
 # and one that makes or breaks a contact is at least as long as this.
 _HOP = 0.02
+# A configuration on a way is reached this near to it.
+_THERE = 1e-10
 # A motion counts if it brings at least this part of what is missing.
 _PROGRESS = 0.01
 
@@ -108,11 +110,44 @@ class Pusher:
         self.attempts += 1
         steer = self._helm.steering(way.formation, drive, keep_on_edges, heading=branch.ahead)
         trace = self._tracer.follow(way.formation, at.z, steer, way.departing, longest=_LONGEST)
+        return self._arrival(at, way.formation, trace)
+
+    def along(self, at: Milestone, formation: Formation, way: FloatArray) -> Milestone | None:
+        """Go from a milestone through given configurations to the last of them, in straight lines.
+
+        Args:
+            at: Where to begin.
+            formation: The contacts that are kept; the straight lines lie on its manifold.
+            way: Shape (w, 3 + n).
+
+        Returns:
+            The last configuration; None if an event ends the motion before.
+        """
+        rest = list(way)
+
+        def steer(z: FloatArray, basis: FloatArray) -> FloatArray | None:
+            while rest and np.abs(rest[0] - z).max() < _THERE:
+                rest.pop(0)
+            return rest[0] - z if rest else None
+
+        self.attempts += 1
+        departing = frozenset(at.around.pairs.tolist()) - set(formation.pairs)
+        trace = self._tracer.follow(formation, at.z, steer, departing)
+        if np.abs(trace.end - way[-1]).max() > SAME:
+            self._failures[trace.kind.value] += 1
+            return None
+        reached = self._arrival(at, formation, trace)
+        if reached is None or np.abs(reached.z - way[-1]).max() > SAME:
+            return None
+        return reached
+
+    def _arrival(self, at: Milestone, formation: Formation, trace: Trace) -> Milestone | None:
+        """The milestone where a motion inside a formation ends, so far as it may be used."""
         points = trace.points
         if trace.kind is EventKind.UNSTABLE:
-            points = self._comfortable(way.formation, points)
-        points = self._strong(way.formation, points)
-        points = self._distinct(at, way.formation, points, trace.kind in OPEN_EVENTS)
+            points = self._comfortable(formation, points)
+        points = self._strong(formation, points)
+        points = self._distinct(at, formation, points, trace.kind in OPEN_EVENTS)
         if np.abs(points[-1] - at.z).max() < SAME:
             self._failures[f'at once, {trace.kind.value}'] += 1
             return None
@@ -122,16 +157,16 @@ class Pusher:
         before, after = set(at.around.pairs.tolist()), set(around.pairs.tolist())
         extent = float(np.abs(points - at.z).max())
         for shortest, opened in ((_EXCURSION, before & after), (_HOP, before | after)):
-            if extent < shortest and opened - set(way.formation.pairs):
+            if extent < shortest and opened - set(formation.pairs):
                 self._failures['a contact would open for an instant only'] += 1
                 return None
         if trace.kind is not EventKind.TARGET:
             self._failures[trace.kind.value] += 1
         stretches = []
         known = at.entered
-        for stability, part in split_by_class(self._tracer, way.formation, points):
-            region = self._region_of(known, way.formation, stability)
-            stretches.append(Stretch(way.formation, stability, part, region))
+        for stability, part in split_by_class(self._tracer, formation, points):
+            region = self._region_of(known, formation, stability)
+            stretches.append(Stretch(formation, stability, part, region))
             known = [region]
         return Milestone(points[-1], around, at, tuple(stretches), known)
 

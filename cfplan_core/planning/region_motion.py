@@ -26,7 +26,6 @@ def straight_motion(
         Points from start to end, shape (s, 3 + n), inside the region between; None if the way
         ends before or leaves the region's stability class.
     """
-
     kept = set(region.formation.pairs)
     there = touching(roadmap.system, start, TOUCH).tolist()
     departing = frozenset(int(pair) for pair in there if pair not in kept)
