@@ -58,12 +58,15 @@ class Exploration:
         return [self.roadmap.pieces[index] for index in sorted(graph)]
 
 
-def explore(problem: Problem, resolution: float = RESOLUTION) -> Exploration:
+def explore(
+    problem: Problem, resolution: float = RESOLUTION, second_order: bool = True
+) -> Exploration:
     """Find all contact formations, split by stability and connected part, that can be reached.
 
     Args:
         problem: With a hand of one or two joints.
         resolution: Spacing of the grid of joint angles, rad; see `PlanOptions`.
+        second_order: Whether stability of second order counts.
 
     Raises:
         CfplanError: The hand has more joints.
@@ -75,7 +78,7 @@ def explore(problem: Problem, resolution: float = RESOLUTION) -> Exploration:
             f'got a hand of {system.joint_count} joints, expected at most {MOST_JOINTS}: others '
             'cannot be explored completely'
         )
-    model = FrictionlessModel(system.load)
+    model = FrictionlessModel(system.load, second_order)
     examined = examine_problem(system, model)
     if examined.findings:
         raise InvalidProblemError(examined.findings)
@@ -96,7 +99,8 @@ def _reachable(roadmap: Roadmap, start: Piece) -> nx.Graph:
     queue = [start]
     graph.add_node(start.index, **_attributes(roadmap, start))
     for piece in queue:
-        for _, other in [*roadmap.neighbours(piece), *roadmap.regions.beside(piece)]:
+        beside = [*roadmap.regions.beside(piece), *roadmap.settling.beside(piece)]
+        for _, other in [*roadmap.neighbours(piece), *beside]:
             if other.index not in graph:
                 graph.add_node(other.index, **_attributes(roadmap, other))
                 queue.append(other)

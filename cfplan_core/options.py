@@ -43,6 +43,8 @@ class PlanOptions:
         required: Contact formations: for each, the plan passes through one that contains it.
         held_joints: Names of joints that do not move.
         stay_within: Corners (x, y) of a convex polygon, m, that the object stays inside.
+        second_order: Whether two contacts may hold the object where they do so to second order: at
+            a strict minimum of its energy.
         prefer: Which plan to choose; unless it is the first one found, the search goes on until no
             better one can exist or a budget is exhausted.
         alternatives: Number of plans wanted, with different sequences of contact formations.
@@ -57,6 +59,7 @@ class PlanOptions:
     required: tuple[tuple[str, ...], ...] = ()
     held_joints: tuple[str, ...] = ()
     stay_within: tuple[tuple[float, float], ...] | None = None
+    second_order: bool = True
     prefer: Preference = Preference.FIRST
     alternatives: int = 1
 

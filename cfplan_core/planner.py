@@ -23,6 +23,7 @@ from cfplan_core.planning.constraints import (
     compile_constraints,
     contradictions,
 )
+from cfplan_core.planning.equations import formation_rows
 from cfplan_core.planning.goal_limits import why_impossible
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.grasp_check import ExaminedProblem, examine_problem
@@ -100,7 +101,7 @@ class _Planning:
         self.began = time.perf_counter()
         self.system = ContactSystem(problem)
         self.moving = self.system
-        self.model = FrictionlessModel(self.system.load)
+        self.model = FrictionlessModel(self.system.load, self.options.second_order)
         self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
         self.search: Search | BestFirst | None = None
 
@@ -156,7 +157,7 @@ class _Planning:
         if examined.goal is not None:
             z = self.moving.reduced(examined.goal.z)
             if self.options.held_joints:
-                z = settle(self.moving, z, examined.goal.pairs)
+                z = settle(self.moving, z, formation_rows(examined.goal.pairs))
             goals.append(z)
         if examined.goal is None or self._goal.tolerance.wide:
             goals.append(GoalTest(self.moving, self._goal))

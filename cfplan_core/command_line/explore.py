@@ -10,7 +10,7 @@ from rich.table import Table
 
 from cfplan_core.command_line.console import answers, new_table
 from cfplan_core.command_line.inputs import examine
-from cfplan_core.command_line.plan_options import resolution_option
+from cfplan_core.command_line.plan_options import resolution_option, second_order_option
 
 if TYPE_CHECKING:
     from cfplan_core.exploration import Exploration
@@ -33,7 +33,14 @@ if TYPE_CHECKING:
     help="Write the graph as JSON, in networkx's node-link form.",
 )
 @resolution_option
-def explore(file: Path, dot_path: Path | None, json_path: Path | None, resolution: float) -> int:
+@second_order_option
+def explore(
+    file: Path,
+    dot_path: Path | None,
+    json_path: Path | None,
+    resolution: float,
+    second_order: bool,
+) -> int:
     """List all contact formations, and the transitions between them, that can be reached.
 
     For the start grasp of a PROBLEM with a hand of one or two joints. A formation is listed once
@@ -43,7 +50,7 @@ def explore(file: Path, dot_path: Path | None, json_path: Path | None, resolutio
     """
     from cfplan_core.exploration import explore as explore_problem
 
-    explored = explore_problem(examine(file).valid_problem(), resolution)
+    explored = explore_problem(examine(file).valid_problem(), resolution, second_order)
     if dot_path is not None or json_path is not None:
         from cfplan_core.report.graph_files import write_dot, write_json
 

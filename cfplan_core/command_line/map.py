@@ -8,7 +8,7 @@ import click
 
 from cfplan_core.command_line.console import answers
 from cfplan_core.command_line.inputs import examine
-from cfplan_core.command_line.plan_options import resolution_option
+from cfplan_core.command_line.plan_options import resolution_option, second_order_option
 from cfplan_core.errors import CfplanError
 
 
@@ -23,7 +23,8 @@ from cfplan_core.errors import CfplanError
     help='Picture to write: PNG, PDF or SVG, by its suffix.',
 )
 @resolution_option
-def map_command(file: Path, output: Path, resolution: float) -> int:
+@second_order_option
+def map_command(file: Path, output: Path, resolution: float, second_order: bool) -> int:
     """Draw the joint space of a PROBLEM, coloured by contact formation.
 
     For hands of one or two joints. What can be reached from the start is strong, what can only be
@@ -41,8 +42,9 @@ def map_command(file: Path, output: Path, resolution: float) -> int:
             f'{output}: expected a file name that ends in {", ".join(f".{f}" for f in FORMATS)}'
         )
     problem = examine(file).valid_problem()
-    explored = explore(problem, resolution)
-    result = plan(problem, PlanOptions(resolution=resolution))
+    explored = explore(problem, resolution, second_order)
+    options = PlanOptions(resolution=resolution, second_order=second_order)
+    result = plan(problem, options)
     save_figure(joint_map(explored, result), output)
     console = answers()
     console.print(f'{explored.coverage[0].upper()}{explored.coverage[1:]}.', soft_wrap=True)

@@ -20,6 +20,7 @@ class Stability(str, Enum):
     UNSTABLE = 'unstable'
     FORCE_CLOSURE = 'force_closure'
     FORM_CLOSURE = 'form_closure'
+    SECOND_ORDER = 'second_order'
 
 
 class Margins(NamedTuple):
@@ -29,14 +30,17 @@ class Margins(NamedTuple):
     never without stability.
 
     Attributes:
-        stable: Shape (s,), positive where there is first-order stability.
+        stable: Shape (s,), positive where there is stability.
         form_closure: Shape (s,), positive where there is form closure.
-        signs: Shape (s, m): along a path on which they stay the same so do both verdicts.
+        signs: Shape (s, m): along a path on which they stay the same so do both verdicts of
+            first order.
+        second_order: True if the stability is only of second order.
     """
 
     stable: FloatArray
     form_closure: FloatArray
     signs: BoolArray
+    second_order: bool = False
 
 
 class Motion(NamedTuple):
@@ -60,15 +64,27 @@ class ContactModel(Protocol):
     def reversible(self) -> bool:
         """True if a path may be followed in both directions."""
 
+    @property
+    def second_order(self) -> bool:
+        """True if stability of second order counts."""
+
     def margins(self, gradients: FloatArray) -> Margins:
-        """Judge the stability of contact formations; `gradients` of shape (s, k, 3 + n)."""
+        """Judge first-order stability of contact formations; `gradients` (s, k, 3 + n)."""
+
+    def second_order_margins(self, gradients: FloatArray, rates: FloatArray) -> Margins:
+        """Judge the stability of two contacts, which is of second order at best.
+
+        Args:
+            gradients: Shape (s, 2, 3 + n).
+            rates: Shape (s, 2, 3, 3 + n), of the wrench directions (`wrench_rates`).
+        """
 
     def torque_limits(self, gradients: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Lower and upper actuator torques that keep all contacts, each of shape (s, n).
 
-        Infinite where unbounded; NaN where no equilibrium exists or the wrenches have a rank
-        below 3, so that the contacts alone do not hold the object. The links' weight is not
-        included.
+        Infinite where unbounded; NaN where no equilibrium exists or where three and more wrenches
+        have a rank below 3, so that the contacts alone do not hold the object. The links' weight
+        is not included.
         """
 
     def holds_within(

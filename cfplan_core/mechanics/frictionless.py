@@ -18,9 +18,11 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.closure import span_margin, span_margins
 from cfplan_core.mechanics.contact_model import Margins, Motion
 from cfplan_core.mechanics.needed_force import needed_forces
+from cfplan_core.mechanics.second_order import pair_forces, second_order_margin
 
 _SINGULAR = 1e-12
 _NEGATIVE = 1e-9
+_IMBALANCE = 1e-6
 
 
 @lru_cache(maxsize=128)
@@ -48,13 +50,15 @@ class FrictionlessModel:
 
     Attributes:
         load: Shape (3,), gravity's wrench on the object, without units; zero if there is none.
+        second_order: Whether stability of second order counts.
     """
 
     reversible = True
 
-    def __init__(self, load: FloatArray) -> None:
+    def __init__(self, load: FloatArray, second_order: bool = True) -> None:
         """Create the model for one direction of gravity (see `ContactSystem.load`)."""
         self.load = load
+        self.second_order = second_order
 
     def margins(self, gradients: FloatArray) -> Margins:
         """Judge stability: the columns of W and f, or of W alone, positively span R³."""
@@ -64,6 +68,14 @@ class FrictionlessModel:
         stable, form_closure, signs = span_margins(vectors)
         # Both are positive in form closure, but the load may make the margin smaller.
         return Margins(np.maximum(stable, form_closure), form_closure, signs)
+
+    def second_order_margins(self, gradients: FloatArray, rates: FloatArray) -> Margins:
+        """Judge two contacts by the energy's curvature (`second_order_margin`)."""
+        nowhere = np.full(len(gradients), -1.0)
+        stable = nowhere
+        if self.second_order:
+            stable = second_order_margin(gradients[..., :3], rates, self.load)
+        return Margins(stable, nowhere, np.empty((len(gradients), 0), dtype=bool), True)
 
     def torque_limits(self, gradients: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Minimum and maximum of τ_j over {c ≥ 0, W c = −f}, over its vertices and rays."""
@@ -111,8 +123,13 @@ class FrictionlessModel:
             j: Shape (s, k, n).
 
         Returns:
-            Shapes (s, b, n) and (s, b) for the b choices of three contacts.
+            Shapes (s, b, n) and (s, b) for the b choices of three contacts; of two there is one.
         """
+        if w.shape[1] == 2:
+            pressing, rest = pair_forces(w, self.load)
+            scale = 1.0 + np.abs(pressing).max(axis=1)
+            holds = (rest <= _IMBALANCE * scale) & (pressing.min(axis=1) >= -_NEGATIVE * scale)
+            return -np.einsum('sc,scn->sn', pressing, j)[:, None], holds[:, None]
         triples = _subsets(w.shape[1], 3)
         a, b, c = (w[:, triples[:, i]] for i in range(3))
         bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)

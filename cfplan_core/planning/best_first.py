@@ -283,6 +283,7 @@ class BestFirst:
     def _neighbours(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
         yield from self._roadmap.neighbours(piece)
         yield from self._roadmap.regions.beside(piece)
+        yield from self._roadmap.settling.beside(piece)
 
     def _motions(self, piece: Piece, start: FloatArray, end: FloatArray) -> tuple[Arc, ...]:
         """Motions inside a piece: one along a curve; over the anchor and straight in a region."""

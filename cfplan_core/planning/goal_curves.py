@@ -6,12 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.bracketing import enclose
+from cfplan_core.planning.equations import equation_gradients
 from cfplan_core.planning.goal_region import GoalRegion
-from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
+from cfplan_core.planning.manifold import formation_equations, project, tangent_basis
 from cfplan_core.planning.pieces import SAME, Piece
 from cfplan_core.planning.tracing import STEP
 
@@ -92,18 +92,18 @@ class CurveGoal:
         before = self._points[first]
         after = self._points[np.minimum(first + 1, int(self._last))]
         guesses = before + fraction[:, None] * (after - before)
-        gradients = gap_gradients(self._system, self._system.place(before), self._pairs)
-        bases = np.linalg.svd(gradients[:, self._rows])[2][:, len(self._rows) :]
-        found = project(self._system, self._pairs[self._rows], before, bases, guesses)
+        gradients = equation_gradients(self._system, before, self._rows)
+        bases = np.linalg.svd(gradients)[2][:, len(self._rows) :]
+        found = project(self._system, self._rows, before, bases, guesses)
         z = np.where(found.converged[:, None], found.points, before)
         z = np.where((fraction == 0.0)[:, None], before, z)
         return np.asarray(np.where((fraction == 1.0)[:, None], after, z))
 
     @cached_property
-    def _rows(self) -> list[int]:
-        middle = self._points[len(self._points) // 2][None]
-        gradients = gap_gradients(self._system, self._system.place(middle), self._pairs)[0]
-        return list(independent_rows(gradients))
+    def _rows(self) -> IntArray:
+        """Independent equations of the curve."""
+        middle = self._points[len(self._points) // 2]
+        return formation_equations(self._system, self._pairs, middle)[0]
 
     def _ratios(self, places: FloatArray) -> FloatArray:
         return self._region.ratios(self.at(places))
@@ -135,11 +135,9 @@ class CurveGoal:
     def _descended(self, z: FloatArray) -> FloatArray | None:
         """Gauss-Newton steps along the curve to the least offsets; None if they leave it."""
         for _ in range(_ITERATIONS):
-            gradients = gap_gradients(self._system, self._system.place(z[None]), self._pairs)[0]
-            basis = tangent_basis(gradients[self._rows])
+            basis = tangent_basis(equation_gradients(self._system, z[None], self._rows)[0])
             ahead = self._region.step(z, basis)
-            rows = self._pairs[self._rows]
-            found = project(self._system, rows, z, basis, (z + ahead)[None])
+            found = project(self._system, self._rows, z, basis, (z + ahead)[None])
             if not found.converged[0]:
                 break
             z = found.points[0]

@@ -16,8 +16,9 @@ from cfplan_core.geometry.separation import penetration_depth
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Goal, Grasp, Problem
+from cfplan_core.planning.equations import formation_rows, is_second_order
 from cfplan_core.planning.manifold import independent_rows, settle
-from cfplan_core.planning.tracing import classify
+from cfplan_core.planning.tracing import classify, stability_margins
 
 # Numbers in files are rounded: nearer than this, in m, is touching (cfplan/problem/1).
 TOUCHING = 1e-6
@@ -34,8 +35,9 @@ class GraspDescription:
 
     Attributes:
         contacts: Names of the elemental contacts that touch.
-        stability: ``form_closure``, ``force_closure`` or ``unstable``.
-        dimension: Dimension of the contact formation's piece of configuration space.
+        stability: ``form_closure``, ``force_closure``, ``second_order`` or ``unstable``.
+        dimension: Dimension of the contact formation's piece of configuration space; of second
+            order that of its equilibria.
     """
 
     contacts: tuple[str, ...]
@@ -155,10 +157,11 @@ def examine_grasp(
     pairs = touching(system, z, TOUCHING / system.size)
     dimension, stability = system.dof, Stability.UNSTABLE
     if len(pairs):
-        z = settle(system, z, pairs)
+        z = _settled(system, z, pairs)
         gradients = gap_gradients(system, system.place(z[None]), pairs)
-        dimension -= len(independent_rows(gradients[0]))
-        stability = classify(model.margins(gradients))
+        margins = stability_margins(system, model, z[None], gradients, pairs)
+        stability = classify(margins)
+        dimension -= len(independent_rows(gradients[0])) + (stability is Stability.SECOND_ORDER)
     together = coincident(system, z, pairs, TOUCHING / system.size)
     names = system.contact_names([int(pair) for pair in pairs])
     if not len(pairs):
@@ -180,8 +183,18 @@ def examine_grasp(
                 'vertices on the inside of edges: a vertex cannot be held on a vertex',
             )
         )
+    elif is_second_order(pairs) and not model.second_order and not findings:
+        findings.append(
+            Finding(
+                file,
+                field,
+                f'only the contacts {" and ".join(names)}, and stability of second order does not '
+                'count',
+                'at least three contacts',
+            )
+        )
     elif stability is Stability.UNSTABLE and not findings:
-        margin = float(model.margins(gradients).stable[0])
+        margin = float(margins.stable[0])
         findings.append(
             Finding(
                 file,
@@ -194,6 +207,16 @@ def examine_grasp(
     elif stability is not Stability.UNSTABLE:
         findings += _efforts(system, model, z, gradients, field, file)
     return ExaminedGrasp(z, pairs, stability, dimension, tuple(findings))
+
+
+def _settled(system: ContactSystem, z: FloatArray, pairs: IntArray) -> FloatArray:
+    """Move a grasp the least way onto its contacts; two of them into balance if that is near."""
+    touching_exactly = settle(system, z, pairs)
+    if not is_second_order(pairs):
+        return touching_exactly
+    balanced = settle(system, z, formation_rows(pairs))
+    near = np.abs(balanced - z).max() <= TOUCHING / system.size
+    return balanced if near else touching_exactly
 
 
 def _efforts(

@@ -19,6 +19,7 @@ from cfplan_core.contact.gaps import (
 from cfplan_core.contact.system import ContactSystem, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.bracketing import enclose
+from cfplan_core.planning.equations import equations
 from cfplan_core.planning.events import Candidate, EventKind
 from cfplan_core.planning.manifold import CONVERGED, Chart, tangent_basis
 
@@ -120,8 +121,7 @@ def _newton(
     residual = np.empty(system.dof)
     for _ in range(_ITERATIONS):
         placed = system.place(z[None])
-        matrix[:k] = gap_gradients(system, placed, chart.rows)[0]
-        residual[:k] = gaps(system, placed, chart.rows).gap[0]
+        (residual[:k],), (matrix[:k],) = equations(system, placed, chart.rows)
         (residual[k],), (matrix[k],) = _event(system, candidate, z[None], placed)
         matrix[k + 1 :] = across
         residual[k + 1 :] = across @ (z - chart.origin)

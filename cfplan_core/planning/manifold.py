@@ -1,8 +1,9 @@
 """The constraint manifold of a contact formation: tangents and projection onto it.
 
-The manifold is {z : g_i(z) = 0 for all contacts i}. Points on it are found by Newton's method on
-the square system made of the gaps and of coordinates T (z − z_0) along a tangent basis T, for many
-coordinates at once: the steps along a whole stretch of a curve are solved for in one batch.
+The manifold is {z : g_i(z) = 0 for all contacts i}, for two contacts with their equilibrium as
+one more equation (`cfplan_core.planning.equations`). Points on it are found by Newton's method on
+the square system made of the equations and of coordinates T (z − z_0) along a tangent basis T, for
+many coordinates at once: the steps along a whole stretch of a curve are solved for in one batch.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cfplan_core.contact.gaps import gap_gradients, gaps
 from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.planning.equations import equation_gradients, equations, formation_rows
 
 # Gradients of gaps have rows of size one: below this a row counts as dependent on others.
 RANK_TOLERANCE = 1e-7
@@ -32,7 +33,7 @@ class Projected(NamedTuple):
 
     Attributes:
         points: Shape (s, 3 + n).
-        gradients: Shape (s, k, 3 + n), of the gaps of the rows asked for, at the points.
+        gradients: Shape (s, k, 3 + n), of the rows asked for, at the points.
         converged: Shape (s,), false where Newton's method found no point.
     """
 
@@ -67,6 +68,25 @@ def independent_rows(gradients: FloatArray) -> tuple[int, ...]:
     return tuple(chosen)
 
 
+def formation_equations(
+    system: ContactSystem, pairs: IntArray, z: FloatArray
+) -> tuple[IntArray, FloatArray]:
+    """Choose a largest independent set of a formation's equations.
+
+    Args:
+        system: Compiled problem.
+        pairs: The contacts, shape (k,).
+        z: Shape (3 + n,).
+
+    Returns:
+        Rows, shape (m,), and their gradients at z, shape (m, 3 + n).
+    """
+    rows = formation_rows(pairs)
+    gradients = equation_gradients(system, z[None], rows)[0]
+    chosen = list(independent_rows(gradients))
+    return rows[chosen], gradients[chosen]
+
+
 def tangent_basis(gradients: FloatArray) -> FloatArray:
     """Orthonormal basis of the null space of independent rows.
 
@@ -91,7 +111,7 @@ def project(
 
     Args:
         system: Compiled problem.
-        rows: Pairs whose gaps vanish, independent, shape (k,).
+        rows: Equations, independent, shape (k,).
         origin: Shape (3 + n,), or (s, 3 + n) for an origin of each guess's own.
         basis: Shape (3 + n - k, 3 + n), completes the gradients to full rank; or one of each
             guess's own, shape (s, 3 + n - k, 3 + n).
@@ -110,9 +130,8 @@ def project(
     with np.errstate(over='ignore', invalid='ignore'):
         for _ in range(_ITERATIONS):
             placed = system.place(points)
-            gradients = gap_gradients(system, placed, rows)
+            residual[:, :k, 0], gradients = equations(system, placed, rows)
             matrix[:, :k] = gradients
-            residual[:, :k, 0] = gaps(system, placed, rows).gap
             residual[:, k:, 0] = (basis @ (points - origin)[..., None])[..., 0] - wanted
             try:
                 step = np.linalg.solve(matrix, residual)[..., 0]
@@ -135,7 +154,7 @@ class Chart:
 
     Attributes:
         system: Compiled problem.
-        rows: Independent pairs whose gaps vanish, shape (k,).
+        rows: Independent equations, shape (k,).
         origin: Shape (3 + n,).
         basis: Orthonormal tangents, shape (d, 3 + n).
         held: Rows of the coordinates that do not change, shape (3 + n - k - d, 3 + n).
@@ -157,36 +176,36 @@ class Chart:
         return self.project(before + places[:, None] * (after - before)).points
 
 
-def settle(system: ContactSystem, z: FloatArray, pairs: IntArray) -> FloatArray:
-    """Move a configuration the least way to where contacts touch exactly.
+def settle(system: ContactSystem, z: FloatArray, rows: IntArray) -> FloatArray:
+    """Move a configuration the least way to where equations hold, contacts touch, exactly.
 
     Args:
         system: Compiled problem.
         z: Shape (3 + n,), touching up to rounding.
-        pairs: Contacts, dependent or not, shape (k,).
+        rows: Equations, dependent or not, shape (k,).
 
     Returns:
         Shape (3 + n,), by Gauss-Newton steps of least norm. Joints that these would take beyond a
         limit stay at it where the contacts allow.
     """
-    settled = _settle(system, z, pairs, np.ones(system.dof, dtype=bool))
+    settled = _settle(system, z, rows, np.ones(system.dof, dtype=bool))
     clipped = settled.copy()
     clipped[3:] = np.clip(settled[3:], system.lower, system.upper)
     free = clipped == settled
     if free.all():
         return settled
-    held = _settle(system, clipped, pairs, free)
-    off = np.abs(gaps(system, system.place(held[None]), pairs).gap).max()
+    held = _settle(system, clipped, rows, free)
+    off = np.abs(equations(system, system.place(held[None]), rows)[0]).max()
     return held if off < _TOUCHING else settled
 
 
-def _settle(system: ContactSystem, z: FloatArray, pairs: IntArray, free: BoolArray) -> FloatArray:
+def _settle(system: ContactSystem, z: FloatArray, rows: IntArray, free: BoolArray) -> FloatArray:
     """Gauss-Newton steps of least norm in the free coordinates."""
     z = z.copy()
     for _ in range(_ITERATIONS):
         placed = system.place(z[None])
-        gradients = gap_gradients(system, placed, pairs)[0][:, free]
-        step = np.linalg.lstsq(gradients, gaps(system, placed, pairs).gap[0], rcond=1e-9)[0]
+        values, gradients = equations(system, placed, rows)
+        step = np.linalg.lstsq(gradients[0][:, free], values[0], rcond=1e-9)[0]
         z[free] -= step
         if np.abs(step).max() < 1e-14:
             break

@@ -90,7 +90,8 @@ def reachable(
     pieces, crossings = [start], []
     known = {start.index}
     for piece in pieces:
-        for z, other in [*roadmap.neighbours(piece), *roadmap.regions.beside(piece)]:
+        beside = [*roadmap.regions.beside(piece), *roadmap.settling.beside(piece)]
+        for z, other in [*roadmap.neighbours(piece), *beside]:
             crossings.append((piece, z, other))
             if other.index not in known:
                 met(len(pieces))

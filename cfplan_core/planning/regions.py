@@ -22,7 +22,11 @@ from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.events import OPEN_EVENTS, EventKind
 from cfplan_core.planning.goal_drives import drives
 from cfplan_core.planning.goal_region import GoalRegion
-from cfplan_core.planning.manifold import independent_rows, tangent_basis
+from cfplan_core.planning.manifold import (
+    formation_equations,
+    independent_rows,
+    tangent_basis,
+)
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, STEP, Trace, classify
@@ -50,6 +54,7 @@ class Regions:
         self._known: dict[tuple[Formation, Stability], list[Region]] = {}
         self._beyond: dict[int, list[tuple[FloatArray, Piece]]] = {}
         self._beside: dict[int, list[tuple[FloatArray, Piece]]] = {}
+        self._losses: dict[int, list[FloatArray]] = {}
 
     def coverage(self) -> str:
         """Say how completely formations were explored."""
@@ -81,6 +86,10 @@ class Regions:
             assert isinstance(piece, Region)
             self._beyond[piece.index] = list(self._shoot(piece))
         return self._beyond[piece.index]
+
+    def losses(self, region: Region) -> Iterator[FloatArray]:
+        """Ways from a region's anchor to where stability ends, each (s, 3 + n); after `beyond`."""
+        yield from self._losses.get(region.index, ())
 
     def drop(self, region: Region, z: FloatArray) -> None:
         """Forget that a region is entered or left at a configuration, shape (3 + n,)."""
@@ -130,7 +139,7 @@ class Regions:
                 heading = self._opening(rest, pair, z)
                 if heading is None:
                     continue
-                region = self._enter(z, Departure(rest, heading, frozenset({pair})))
+                region = self.enter(z, Departure(rest, heading, frozenset({pair})))
                 if region is not None:
                     yield z, region
 
@@ -154,7 +163,7 @@ class Regions:
         steepness = float(np.linalg.norm(slope))
         return None if steepness < STABILITY_MARGIN else slope @ basis / steepness
 
-    def _enter(self, z: FloatArray, way: Departure) -> Region | None:
+    def enter(self, z: FloatArray, way: Departure) -> Region | None:
         """Follow a heading into a region and return it; None if it ends at once."""
         trace = self._ray(z, way, _DEPTH)
         self._roadmap.attempts += 1
@@ -190,12 +199,12 @@ class Regions:
         """Make the region that points from z lead into; the last of them is its anchor."""
         roadmap = self._roadmap
         anchor = inward[-1]
-        gradients = roadmap.tracer.gradients(anchor[None], formation.array)[0]
+        rows, _ = formation_equations(roadmap.system, formation.array, anchor)
         region = Region(
             len(roadmap.pieces),
             formation,
             classify(roadmap.tracer.margins(formation, anchor[None])),
-            roadmap.system.dof - len(independent_rows(gradients)),
+            roadmap.system.dof - len(rows),
             anchor[None],
             (),
             [(z, inward[::-1])],
@@ -264,12 +273,14 @@ class Regions:
                 ways = self._ways(region, end, _heading(points))
             else:
                 roadmap.failures[trace.why] += 1
+                if trace.kind is EventKind.UNSTABLE:
+                    self._losses.setdefault(region.index, []).append(points)
                 continue
             region.links.append((end, points))
             if not others and self._joins(region, end):
                 yield end, roadmap.root(end)
             for way in ways:
-                entered = self._enter(end, way)
+                entered = self.enter(end, way)
                 if entered is not None and entered is not region:
                     yield end, entered
 
@@ -278,14 +289,14 @@ class Regions:
 
         Each comes with the columns of z, joints, that are held still.
         """
-        gradients = self._roadmap.tracer.gradients(region.points, region.formation.array)[0]
-        rows = gradients[list(independent_rows(gradients))]
+        system = self._roadmap.system
+        _, rows = formation_equations(system, region.formation.array, region.anchor)
         basis = tangent_basis(rows)
         for direction in _directions(len(basis)):
             yield direction @ basis, ()
-        columns = range(3, self._roadmap.system.dof)
+        columns = range(3, system.dof)
         for held in islice(combinations(columns, len(basis) - 1), _RAYS):
-            still = np.concatenate([rows, np.eye(self._roadmap.system.dof)[list(held)]])
+            still = np.concatenate([rows, np.eye(system.dof)[list(held)]])
             if len(independent_rows(still)) == len(still):
                 (tangent,) = tangent_basis(still)
                 yield tangent, held

@@ -21,12 +21,18 @@ from cfplan_core.mechanics.contact_model import ContactModel, Stability
 from cfplan_core.options import RESOLUTION
 from cfplan_core.planning.constraints import UNCONSTRAINED, Constraints
 from cfplan_core.planning.events import OPEN_EVENTS
-from cfplan_core.planning.manifold import independent_rows, project, tangent_basis
+from cfplan_core.planning.manifold import (
+    formation_equations,
+    independent_rows,
+    project,
+    tangent_basis,
+)
 from cfplan_core.planning.pieces import SAME, Junction, Piece
 from cfplan_core.planning.regions import Regions
+from cfplan_core.planning.settling import Settling
 from cfplan_core.planning.sheets import Sheets
 from cfplan_core.planning.stability_classes import split_by_class
-from cfplan_core.planning.tracing import STEP, Trace, Tracer, classify
+from cfplan_core.planning.tracing import STEP, Trace, Tracer, classify, stability_margins
 from cfplan_core.planning.transitions import Departure, Surroundings, departures, surroundings
 
 
@@ -38,6 +44,7 @@ class Roadmap:
         failures: Why transitions failed, with how often.
         attempts: How many transitions were tried.
         regions: Pieces of dimension two and more.
+        settling: Transitions between stability of first and second order.
     """
 
     def __init__(
@@ -73,6 +80,7 @@ class Roadmap:
             if resolution is None or system.joint_count != 2
             else Sheets(self, resolution)
         )
+        self.settling = Settling(self)
 
     def formations(self) -> int:
         """Count the distinct contact formations that were met."""
@@ -85,8 +93,8 @@ class Roadmap:
         junction = self.junction(z)
         if junction.isolated:
             return self._point(junction)
-        gradients = self.tracer.gradients(z[None], junction.formation.array)[0]
-        basis = tangent_basis(gradients[list(independent_rows(gradients))])
+        _, gradients = formation_equations(self.system, junction.formation.array, z)
+        basis = tangent_basis(gradients)
         if len(basis) > 1:
             return self.regions.around(junction.formation, z)
         known = self._on_curve(junction.formation, z)
@@ -129,7 +137,11 @@ class Roadmap:
             return self._remember(self._refused(z, around), cells)
         stability = Stability.UNSTABLE
         if len(around.pairs) and not around.held_vertex:
-            stability = classify(self.model.margins(around.gradients[None]))
+            stability = classify(
+                stability_margins(
+                    self.system, self.model, z[None], around.gradients[None], around.pairs
+                )
+            )
         isolated = (
             stability is not Stability.UNSTABLE
             and len(independent_rows(around.gradients)) == self.system.dof
@@ -195,15 +207,26 @@ class Roadmap:
         """Follow a way out of a junction."""
         self.attempts += 1
         junction.taken[way] = None
-        trace = self._follow(junction.z, departure)
-        if np.abs(trace.end - junction.z).max() < SAME:
-            self.failures[f'at once, {trace.why}'] += 1
-            return
-        known = self._on_curve(departure.formation, trace.points[1])
+        known = self.curve_along(junction.z, departure)
         if known is not None:
             junction.taken[way] = known
-        else:
-            self._add_curve(departure.formation, trace.points, (junction, self._end(trace)))
+
+    def curve_along(self, z: FloatArray, departure: Departure) -> Piece | None:
+        """Return the curve that a way out of a junction leads to; None if it ends at once.
+
+        Args:
+            z: Of the junction, shape (3 + n,).
+            departure: The way, into a formation of dimension one.
+        """
+        trace = self._follow(z, departure)
+        if np.abs(trace.end - z).max() < SAME:
+            self.failures[f'at once, {trace.why}'] += 1
+            return None
+        known = self._on_curve(departure.formation, trace.points[1])
+        if known is not None:
+            return known
+        ends = (self.junction(z), self._end(trace))
+        return self._add_curve(departure.formation, trace.points, ends)[0]
 
     def _follow(self, z: FloatArray, departure: Departure) -> Trace:
         heading = departure.direction
@@ -264,17 +287,15 @@ class Roadmap:
             near = np.abs(piece.points - z).max(axis=1)
             if near.min() > 2.0 * STEP:
                 continue
-            rows = formation.array
-            gradients = self.tracer.gradients(z[None], rows)[0]
-            chosen = list(independent_rows(gradients))
-            basis = tangent_basis(gradients[chosen])
+            rows, gradients = formation_equations(self.system, formation.array, z)
+            basis = tangent_basis(gradients)
             along = (piece.points - z) @ basis[0]
             crossing = np.flatnonzero((along[:-1] * along[1:] <= 0.0) & (near[:-1] < 3.0 * STEP))
             for i in crossing:
                 span = along[i + 1] - along[i]
                 fraction = -along[i] / span if span else 0.0
                 guess = piece.points[i] + fraction * (piece.points[i + 1] - piece.points[i])
-                found = project(self.system, rows[chosen], z, basis, guess[None])
+                found = project(self.system, rows, z, basis, guess[None])
                 if found.converged[0] and np.abs(found.points[0] - z).max() < SAME:
                     return piece
         return None

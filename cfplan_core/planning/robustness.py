@@ -4,6 +4,9 @@ The margin is the smallest of five ratios; 1 is comfortable, 0 is the border of 
 
 - force: 1 / F, where F is the needed force in weights of the object;
 - hold: the stability margin, the distance of W's columns and f from no longer spanning R³, / 0.2;
+  for two contacts that of second order, the smallest of the energy's curvature, the two forces
+  and the sine between the wrenches. Where other contacts stop pressing and the object settles onto
+  two of them, these two count if that is more, less the load that they leave to the others;
 - clearance: the smallest distance of a near miss, in object sizes, / 0.1. A near miss is a vertex
   and an edge that come nearer than 0.1 and part again without having touched in between;
 - torque: k contacts of rank 3 leave k − 3 joints to be controlled by their torque (Trinkle &
@@ -18,16 +21,21 @@ and its goal. `docs/optimality.md` says why these.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
+from cfplan_core.contact.curvature import wrench_rates
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.gaps import gap_gradients
-from cfplan_core.contact.system import ContactSystem
+from cfplan_core.contact.system import ContactSystem, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel
+from cfplan_core.mechanics.second_order import pair_forces, unbalanced_margin
+from cfplan_core.planning.equations import is_second_order
 from cfplan_core.planning.near_misses import near_misses
+from cfplan_core.planning.tracing import stability_margins
 
 _COMFORTABLE_HOLD = 0.2
 COMFORTABLE_CLEARANCE = 0.1
@@ -97,12 +105,13 @@ class Robustness:
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Ratios of force, hold, torque and limits, each of shape (s,)."""
         system = self.system
-        gradients = gap_gradients(system, system.place(z), formation.array)
+        placed = system.place(z)
+        gradients = gap_gradients(system, placed, formation.array)
         joints = z[:, 3:]
         room = np.minimum(joints - system.lower, system.upper - joints).min(axis=1)
         return (
             1.0 / np.maximum(self._model.needed_forces(gradients), 1e-9),
-            np.maximum(self._model.margins(gradients).stable, 0.0) / _COMFORTABLE_HOLD,
+            np.maximum(self._hold(formation, z, placed, gradients), 0.0) / _COMFORTABLE_HOLD,
             self._torque(gradients, z) / _COMFORTABLE_TORQUE,
             room / _COMFORTABLE_LIMIT,
         )
@@ -111,6 +120,23 @@ class Robustness:
         """Ratio of the near misses on a path, at its points; shape (s,)."""
         z = np.concatenate(parts)
         return near_misses(self.system, z, COMFORTABLE_CLEARANCE) / COMFORTABLE_CLEARANCE
+
+    def _hold(
+        self, formation: Formation, z: FloatArray, placed: Placement, gradients: FloatArray
+    ) -> FloatArray:
+        """Stability margin, of two contacts where that is more; shape (s,)."""
+        system, model, pairs = self.system, self._model, formation.array
+        hold = stability_margins(system, model, z, gradients, pairs).stable
+        if not model.second_order or is_second_order(pairs):
+            return hold
+        for chosen in combinations(range(len(pairs)), 2):
+            two = list(chosen)
+            rates = wrench_rates(system, placed, pairs[two])
+            wrenches = gradients[:, two, :3]
+            _, rest = pair_forces(wrenches, system.load)
+            settled = unbalanced_margin(wrenches, rates, system.load) - rest
+            hold = np.maximum(hold, settled)
+        return hold
 
     def _torque(self, gradients: FloatArray, z: FloatArray) -> FloatArray:
         """Width of the narrowest interval of torques that has to be held."""

@@ -124,6 +124,7 @@ class Search:
         self._blocked = blocked
         self._grown = grown
         self._crossing = False
+        self._settling = False
 
     def run(self) -> bool:
         """Grow until the trees join (true) or one of them is complete without it (false)."""
@@ -132,6 +133,9 @@ class Search:
             if piece.index in self._blocked:
                 return False
             tree.frontier = [tree.add(Node(piece, None, None, 0))]
+        # A grasp that is stable to second order is left where others lose their stability.
+        roots = [tree.nodes[0].piece for tree in self._roots]
+        self._settling = any(p.stability is Stability.SECOND_ORDER for p in roots)
         self._look(self.trees[0].nodes[0].piece, self.trees[0].root)
         # Among points and curves a complete tree is proof: the other can do no more.
         while self.meeting is None and all(tree.frontier for tree in self._roots):
@@ -139,11 +143,19 @@ class Search:
         if self.meeting is None:
             # Points and curves are exhausted: open contacts and cross regions.
             self._crossing = True
-            for tree in self._roots:
-                tree.frontier = list(range(len(tree.nodes)))
-            while self.meeting is None and any(tree.frontier for tree in self._roots):
-                self._grow()
+            self._grow_again()
+        if self.meeting is None and self.roadmap.model.second_order and not self._settling:
+            # So is stability of first order: let contacts go that carry nothing.
+            self._settling = True
+            self._grow_again()
         return self.meeting is not None
+
+    def _grow_again(self) -> None:
+        """Grow from all nodes until the trees join or are complete."""
+        for tree in self._roots:
+            tree.frontier = list(range(len(tree.nodes)))
+        while self.meeting is None and any(tree.frontier for tree in self._roots):
+            self._grow()
 
     def _look(self, piece: Piece, entry: FloatArray) -> bool:
         """Tell whether a piece of the initial tree ends the search, and remember it if so."""
@@ -171,6 +183,8 @@ class Search:
         yield from self.roadmap.neighbours(piece)
         if self._crossing:
             yield from self.roadmap.regions.beside(piece)
+        if self._settling:
+            yield from self.roadmap.settling.beside(piece)
 
     def _grow(self) -> None:
         """Add a level to the tree with the smaller frontier; join at least depth if they meet."""

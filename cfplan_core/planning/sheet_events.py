@@ -16,6 +16,7 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.gaps import gap_gradients, gaps
 from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray, Placement
 from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.planning.equations import equations
 from cfplan_core.planning.manifold import CONVERGED
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
 
@@ -110,7 +111,7 @@ def locate_first(
     Args:
         tracer: Knows system and model.
         formation: The contacts.
-        rows: Three of them that are independent for fixed joints.
+        rows: Three of their equations that are independent for fixed joints.
         samples: Shape (m, 3, 3 + n), beginning, middle and end of the steps.
         happenings: In the first half of a step in which there are any.
     """
@@ -143,7 +144,8 @@ def locate_first(
     near[:, formation.array] = False
     start_gap = gaps(system, system.place(before), slice(None)).gap
     clean = np.asarray(~(near & (start_gap > _NEAR)).any(axis=1))
-    margins = tracer.judge(z, gap_gradients(system, placed, formation.array))
+    gradients = gap_gradients(system, placed, formation.array)
+    margins = tracer.judge(z, gradients, formation.array)
     holds = margins.stable > STABILITY_MARGIN
     links = is_gap & (happenings.pair >= system.contact_count)
     for k in first[real[first] & clean[first]]:
@@ -175,8 +177,7 @@ def _newton(
     change = np.full(count, np.inf)
     for _ in range(_ITERATIONS):
         placed = system.place(z)
-        matrix[:, :k] = gap_gradients(system, placed, rows)
-        residual[:, :k, 0] = gaps(system, placed, rows).gap
+        residual[:, :k, 0], matrix[:, :k] = equations(system, placed, rows)
         residual[:, k, 0], matrix[:, k] = _values(system, happenings, placed)
         residual[:, k + 1, 0] = ((z - before) * across).sum(axis=1)
         regular = np.abs(np.linalg.det(matrix)) > 1e-14

@@ -29,7 +29,7 @@ class Table:
 
     Attributes:
         formation: The contacts.
-        rows: Three of them that are independent for fixed joints, shape (3,).
+        rows: Three of their equations that are independent for fixed joints, shape (3,).
         slivers: Sheets between the nodes.
         vertices: For each node the sheets over it, with the index of the vertex.
     """
@@ -63,6 +63,7 @@ class Table:
             for second, between in beside.items():
                 sheet.connect(index[first], index[second], between)
         sheet.borders += [replace(border, vertex=index[border.vertex]) for border in patch.borders]
+        sheet.losses += [(index[vertex], joints) for vertex, joints in patch.losses]
         return index
 
 
@@ -126,6 +127,7 @@ class _Filling:
             elif refining and count < _FEW and level + 1 < self.grid.levels:
                 # What stopped a step is met again by a shorter one.
                 self.stopped = []
+                self.sheet.losses = []
                 level += 1
                 self.front = list(range(count))
             elif self.stopped:
@@ -160,7 +162,9 @@ class _Filling:
             self.done.add(step[:3])
             if taken.clear[k]:
                 self._arrive(step, taken.ends[k], taken.middles[k : k + 1])
-            elif not taken.lost[k]:
+            elif taken.lost[k]:
+                self.sheet.losses.append((step[0], joints[k]))
+            else:
                 self.stopped.append(step)
 
     def _look_closer(self) -> None:
@@ -168,14 +172,15 @@ class _Filling:
         steps, self.stopped = self.stopped, []
         starts, joints = self._ends(steps)
         formation, rows = self.table.formation, self.table.rows
-        for step, way in zip(
-            steps, walk(self.tracer, formation, rows, starts, joints), strict=True
-        ):
+        ways = walk(self.tracer, formation, rows, starts, joints)
+        for step, way, angles in zip(steps, ways, joints, strict=True):
             if way.arrived:
                 self._arrive(step, way.points[-1], way.points[1:-1])
             elif way.leads_on:
                 border = Border(step[0], way.points, step[3], way.changes_class)
                 self.sheet.borders.append(border)
+            else:
+                self.sheet.losses.append((step[0], angles))
 
     def _ends(self, steps: list[_Step]) -> tuple[FloatArray, FloatArray]:
         """Where steps begin, shape (m, 3 + n), and the joint angles they lead to, (m, n)."""

@@ -52,6 +52,7 @@ class Sheet(Region):
         places: Node of the grid below each vertex; None below an anchor that is on none.
         edges: For each vertex those next to it, with the configurations between, shape (s, 3 + n).
         borders: Where it ends at something that may lead on.
+        losses: Steps that lose stability: vertices, with the joint angles that they lead to.
         straight: Follows the straight path between two configurations inside; None if it leaves.
     """
 
@@ -59,6 +60,7 @@ class Sheet(Region):
     places: list[Place | None] = field(default_factory=list)
     edges: list[dict[int, FloatArray]] = field(default_factory=list)
     borders: list[Border] = field(default_factory=list)
+    losses: list[tuple[int, FloatArray]] = field(default_factory=list)
     straight: Callable[[FloatArray, FloatArray], FloatArray | None] = lambda start, end: None
     _index_of: dict[bytes, int] = field(default_factory=dict)
 

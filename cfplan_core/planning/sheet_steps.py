@@ -16,6 +16,7 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.gaps import gap_gradients, gaps, wedge_lifts
 from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.planning.equations import equation_gradients
 from cfplan_core.planning.manifold import project
 from cfplan_core.planning.sheet_events import Happenings, Kind
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
@@ -72,7 +73,7 @@ def take_steps(
     Args:
         tracer: Knows system and model.
         formation: The contacts.
-        rows: Three of them that are independent for fixed joints.
+        rows: Three of their equations that are independent for fixed joints.
         starts: Shape (m, 3 + n), stable.
         joints: Shape (m, n), where they shall be.
     """
@@ -82,10 +83,11 @@ def take_steps(
     path = np.stack([starts, middles, ends], axis=1)
     flat = path.reshape(-1, system.dof)
     placed = system.place(flat)
-    margins = tracer.judge(flat, gap_gradients(system, placed, formation.array))
+    gradients = gap_gradients(system, placed, formation.array)
+    margins = tracer.judge(flat, gradients, formation.array)
     stable = (margins.stable > STABILITY_MARGIN).reshape(count, 3)
     closed = (margins.form_closure > STABILITY_MARGIN).reshape(count, 3)
-    signs = margins.signs.reshape(count, 3, -1)
+    signs = margins.signs.reshape(count, 3, margins.signs.shape[1])
     turning = (signs[:, 1:] != signs[:, :-1]).any(axis=2) & stable[:, 1:]
     turning |= closed[:, 1:] != closed[:, :-1]
 
@@ -111,7 +113,7 @@ def _continued(
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Middles and ends of steps, and which of them are smooth."""
     count = len(starts)
-    gradients = tracer.gradients(starts, rows)
+    gradients = equation_gradients(tracer.system, starts, rows)
     change = np.zeros_like(starts)
     change[:, 3:] = joints - starts[:, 3:]
     drive = (gradients[..., 3:] @ change[:, 3:, None])[..., 0]

@@ -54,7 +54,7 @@ def walk(
     Args:
         tracer: Knows system and model.
         formation: The contacts.
-        rows: Three of them that are independent for fixed joints.
+        rows: Three of their equations that are independent for fixed joints.
         starts: Shape (m, 3 + n), stable.
         joints: Shape (m, n).
     """
@@ -125,7 +125,7 @@ def _in_parts(
 def _exactly(
     tracer: Tracer, formation: Formation, rows: IntArray, z: FloatArray, joints: FloatArray
 ) -> Walk:
-    trace = _towards(tracer, formation, z, joints)
+    trace = towards(tracer, formation, z, joints)
     if len(trace.points) < 2:
         return Walk(trace.points, arrived=trace.kind is EventKind.TARGET)
     (_, points), *others = split_by_class(tracer, formation, trace.points)
@@ -138,7 +138,7 @@ def _exactly(
     return Walk(points, leads_on=trace.kind in OPEN_EVENTS)
 
 
-def _towards(tracer: Tracer, formation: Formation, z: FloatArray, joints: FloatArray) -> Trace:
+def towards(tracer: Tracer, formation: Formation, z: FloatArray, joints: FloatArray) -> Trace:
     """Follow a formation from z to where the joints have given angles."""
 
     def steer(at: FloatArray, basis: FloatArray) -> FloatArray | None:

@@ -18,17 +18,20 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.system import BoolArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.options import RESOLUTION
+from cfplan_core.planning.equations import equation_gradients, formation_rows, is_second_order
+from cfplan_core.planning.events import EventKind
 from cfplan_core.planning.goal_region import GoalRegion
 from cfplan_core.planning.joint_grid import JointGrid, Place
-from cfplan_core.planning.manifold import independent_rows, project
+from cfplan_core.planning.manifold import formation_equations, independent_rows, project
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.regions import Regions, _heading
+from cfplan_core.planning.settling_steps import settling_steps
 from cfplan_core.planning.sheet_crossing import step_across
 from cfplan_core.planning.sheet_filling import Table, fill
 from cfplan_core.planning.sheet_goals import goals_on_sheet
 from cfplan_core.planning.sheet_graph import Border, Sheet
 from cfplan_core.planning.sheet_steps import take_steps
-from cfplan_core.planning.sheet_walks import walk
+from cfplan_core.planning.sheet_walks import towards, walk
 from cfplan_core.planning.tracing import STEP, classify
 from cfplan_core.planning.transitions import Departure
 
@@ -37,6 +40,8 @@ if TYPE_CHECKING:
 
 # Number of grids, each half as coarse as the one before.
 _LEVELS = 4
+# Distance of places where contact forces are let vanish on a border, by the grid's spacing.
+_BORDER = 3.0
 
 
 class Sheets(Regions):
@@ -86,19 +91,37 @@ class Sheets(Regions):
             region.links.append((points[-1], points))
             yield points[-1]
 
+    def losses(self, region: Region) -> Iterator[FloatArray]:
+        """Ways from a sheet's vertices to where two contacts come to hold the object alone.
+
+        Not all of them: borders are sampled.
+        """
+        assert isinstance(region, Sheet)
+        if region.places == [None]:
+            yield from super().losses(region)
+        if not region.losses:
+            return
+        tracer, rows = self._roadmap.tracer, self._table(region.formation, region.anchor).rows
+        vertices = np.array([region.vertices[vertex] for vertex, _ in region.losses])
+        joints = np.array([angles for _, angles in region.losses])
+        for k in settling_steps(tracer, rows, vertices, joints, _BORDER * self.grid.spacing):
+            trace = towards(tracer, region.formation, vertices[k], joints[k])
+            if trace.kind is EventKind.UNSTABLE and len(trace.points) > 1:
+                yield trace.points
+
     def _samples(self, piece: Piece) -> FloatArray:
         """Points of a curve and three more between any two of them."""
         if piece.dimension != 1:
             return piece.points
-        tracer, pairs = self._roadmap.tracer, piece.formation.array
+        system = self._roadmap.system
         before, after = piece.points[:-1], piece.points[1:]
-        gradients = tracer.gradients(before, pairs)
-        rows = list(independent_rows(gradients[len(before) // 2]))
-        bases = np.linalg.svd(gradients[:, rows])[2][:, len(rows) :]
+        middle = before[len(before) // 2]
+        rows, _ = formation_equations(system, piece.formation.array, middle)
+        bases = np.linalg.svd(equation_gradients(system, before, rows))[2][:, len(rows) :]
         parts = [before]
         for fraction in (0.25, 0.5, 0.75):
             guesses = before + fraction * (after - before)
-            found = project(tracer.system, pairs[rows], before, bases, guesses)
+            found = project(system, rows, before, bases, guesses)
             parts.append(np.where(found.converged[:, None], found.points, before))
         between = np.stack(parts, axis=1).reshape(-1, piece.points.shape[1])
         return np.concatenate([between, piece.points[-1:]])
@@ -208,9 +231,10 @@ class Sheets(Regions):
 
     def _table(self, formation: Formation, z: FloatArray) -> Table:
         if formation not in self._tables:
-            gradients = self._roadmap.tracer.gradients(z[None], formation.array)[0]
-            rows = formation.array[list(independent_rows(gradients[:, :3]))]
-            self._tables[formation] = Table(formation, rows)
+            rows = formation_rows(formation.array)
+            gradients = equation_gradients(self._roadmap.system, z[None], rows)[0]
+            chosen = list(independent_rows(gradients[:, :3]))
+            self._tables[formation] = Table(formation, rows[chosen])
         return self._tables[formation]
 
     def _shoot(self, region: Region) -> Iterator[tuple[FloatArray, Piece]]:
@@ -249,8 +273,12 @@ class Sheets(Regions):
             starts = np.array([border.z for border in some])
             joints = np.array([self.grid.joints(border.beyond) for border in some])
             departing = [onwards[number][1].departing for number in numbers]
+            crossed: list[FloatArray | None]
             tracer = self._roadmap.tracer
-            crossed = step_across(tracer, formation, table.rows, starts, joints, departing)
+            if is_second_order(formation):
+                crossed = [None] * len(numbers)
+            else:
+                crossed = step_across(tracer, formation, table.rows, starts, joints, departing)
             for number, points in zip(numbers, crossed, strict=True):
                 border, way = onwards[number]
                 place = border.beyond
@@ -259,6 +287,6 @@ class Sheets(Regions):
                 if points is not None and (known or self.grid.is_coarse(place)):
                     entered = self._linked(table, place, 0, border.z, points[:1:-1], points[:2])
                 else:
-                    entered = self._enter(border.z, way)
+                    entered = self.enter(border.z, way)
                 if entered is not None and entered is not region:
                     yield border.z, entered

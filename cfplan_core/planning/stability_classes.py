@@ -8,6 +8,7 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.bracketing import enclose
+from cfplan_core.planning.equations import is_second_order
 from cfplan_core.planning.manifold import Chart, independent_rows, tangent_basis
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
 
@@ -31,6 +32,8 @@ def split_by_class(
     Returns:
         Classes with their points; neighbours share a point, which has form closure, by a hair.
     """
+    if is_second_order(formation):
+        return [(Stability.SECOND_ORDER, points)]
     points = _refined(tracer, formation, points)
     closed = tracer.margins(formation, points).form_closure > STABILITY_MARGIN
     parts = []

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cfplan_core.contact.curvature import wrench_rates
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.gaps import gap_gradients, gaps, wedge_lifts
 from cfplan_core.contact.system import ContactSystem, IntArray, Placement
@@ -20,9 +21,14 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Margins, Stability
 from cfplan_core.planning.bounds import Bound
 from cfplan_core.planning.bracketing import enclose
+from cfplan_core.planning.equations import (
+    equation_gradients,
+    formation_rows,
+    is_second_order,
+)
 from cfplan_core.planning.events import Candidate, EventKind, sight
 from cfplan_core.planning.locating import locate
-from cfplan_core.planning.manifold import Chart, independent_rows, tangent_basis
+from cfplan_core.planning.manifold import Chart, formation_equations, tangent_basis
 
 # Margins below this count as lost: nothing is planned that is held by less.
 STABILITY_MARGIN = 1e-6
@@ -66,9 +72,32 @@ def classify(margins: Margins) -> Stability:
     """Name the stability class of the first configuration of a batch."""
     if not margins.stable[0] > STABILITY_MARGIN:
         return Stability.UNSTABLE
+    if margins.second_order:
+        return Stability.SECOND_ORDER
     if margins.form_closure[0] > STABILITY_MARGIN:
         return Stability.FORM_CLOSURE
     return Stability.FORCE_CLOSURE
+
+
+def stability_margins(
+    system: ContactSystem,
+    model: ContactModel,
+    z: FloatArray,
+    gradients: FloatArray,
+    pairs: IntArray,
+) -> Margins:
+    """Judge the stability of contacts, of two by second order.
+
+    Args:
+        system: Compiled problem.
+        model: Mechanics.
+        z: Shape (s, 3 + n).
+        gradients: Shape (s, k, 3 + n), of the contacts' gaps there.
+        pairs: The contacts, shape (k,).
+    """
+    if not is_second_order(pairs):
+        return model.margins(gradients)
+    return model.second_order_margins(gradients, wrench_rates(system, system.place(z), pairs))
 
 
 class Tracer:
@@ -96,31 +125,35 @@ class Tracer:
 
     def margins(self, formation: Formation, z: FloatArray) -> Margins:
         """Stability margins of a formation at configurations of shape (s, 3 + n)."""
-        return self.judge(z, self.gradients(z, formation.array))
+        pairs = formation.array
+        return self.judge(z, self.gradients(z, pairs), pairs)
 
-    def judge(self, z: FloatArray, gradients: FloatArray) -> Margins:
+    def judge(self, z: FloatArray, gradients: FloatArray, pairs: IntArray) -> Margins:
         """Stability margins, lowered to those of the bounds.
 
         Args:
             z: Shape (s, 3 + n).
             gradients: Shape (s, k, 3 + n), of the gaps of the contacts there.
+            pairs: These contacts, shape (k,).
         """
-        margins = self.model.margins(gradients)
+        margins = stability_margins(self.system, self.model, z, gradients, pairs)
         for bound in self.bounds:
             margins = margins._replace(
                 stable=np.minimum(margins.stable, bound.margins(z, gradients))
             )
         return margins
 
-    def binding(self, z: FloatArray, gradients: FloatArray) -> Bound | None:
+    def binding(self, z: FloatArray, gradients: FloatArray, pairs: IntArray) -> Bound | None:
         """Which bound ends a motion at a configuration; None if stability does.
 
         Args:
             z: Shape (1, 3 + n).
             gradients: Shape (1, k, 3 + n).
+            pairs: The contacts, shape (k,).
         """
         tightest = None
-        least = float(self.model.margins(gradients).stable[0])
+        margins = stability_margins(self.system, self.model, z, gradients, pairs)
+        least = float(margins.stable[0])
         for bound in self.bounds:
             margin = float(bound.margins(z, gradients)[0])
             if margin < least:
@@ -179,10 +212,8 @@ class _Pursuit:
         self.points = [start[None]]
         self.step = STEP
         self.fresh = True
-        gradients = self._gradients(start[None], self.contacts)[0]
-        chosen = independent_rows(gradients)
-        self.rows: IntArray = self.contacts[list(chosen)]
-        self.redundant = len(chosen) < len(self.contacts)
+        self.rows, _ = formation_equations(self.system, self.contacts, start)
+        self.redundant = len(self.rows) < len(formation_rows(self.contacts))
         self.held = np.eye(self.system.dof)[list(held)]
         self.chart = self._chart(start)
 
@@ -217,7 +248,8 @@ class _Pursuit:
         points, why = np.concatenate(self.points), kind.value
         if kind is EventKind.UNSTABLE and self.tracer.bounds:
             at = points[-1:] if last is None else last
-            bound = self.tracer.binding(at, self._gradients(at, self.contacts))
+            gradients = self._gradients(at, self.contacts)
+            bound = self.tracer.binding(at, gradients, self.contacts)
             why = why if bound is None else bound.reason
         return Trace(points, kind, pairs, why)
 
@@ -259,7 +291,7 @@ class _Pursuit:
                 # An edge that lay flush would dip into the edge that its vertex touches.
                 return self._finish(EventKind.CONTACT, self.formation.pairs)
         sighting = sight(self.system, self.formation, samples, placed)
-        margins = self.tracer.judge(samples, gradients)
+        margins = self.tracer.judge(samples, gradients, self.contacts)
         samples, stable = self._watch(samples, margins, sighting.interval)
         lost = int(np.argmax(stable[1:] <= 0.0)) if (stable[1:] <= 0.0).any() else len(stable)
         if self.fresh and lost == 0:
@@ -300,7 +332,7 @@ class _Pursuit:
         """
         stable = margins.stable - STABILITY_MARGIN
         turns = (margins.signs[1:] != margins.signs[:-1]).any(axis=1)
-        if self.tracer.bounds:
+        if self.tracer.bounds or margins.second_order:
             lowest = (stable[1:-1] <= stable[:-2]) & (stable[1:-1] <= stable[2:])
             lowest &= stable[1:-1] < _NARROW
             turns[:-1] |= lowest
@@ -310,7 +342,7 @@ class _Pursuit:
         for interval in np.flatnonzero(suspects):
             ends = samples[interval], samples[interval + 1]
             between = self.chart.between(*ends, _INNER)
-            inner = self.tracer.judge(between, self._gradients(between, self.contacts)).stable
+            inner = self.tracer.margins(self.formation, between).stable
             if (inner <= STABILITY_MARGIN).any():
                 first = int(np.argmax(inner <= STABILITY_MARGIN))
                 samples = np.concatenate([samples[: interval + 1], between[first : first + 1]])
@@ -329,7 +361,7 @@ class _Pursuit:
         self.fresh = False
 
     def _chart(self, z: FloatArray) -> Chart:
-        gradients = self._gradients(z[None], self.rows)[0]
+        gradients = equation_gradients(self.system, z[None], self.rows)[0]
         basis = tangent_basis(np.concatenate([gradients, self.held]))
         return Chart(self.system, self.rows, z, basis, self.held)
 
@@ -398,8 +430,7 @@ class _Pursuit:
 
         def margin(places: FloatArray) -> FloatArray:
             between = chart.between(before, after, places)
-            gradients = self._gradients(between, self.contacts)
-            return self.tracer.judge(between, gradients).stable - STABILITY_MARGIN
+            return self.tracer.margins(self.formation, between).stable - STABILITY_MARGIN
 
         place = np.array([enclose(margin)[0]])
         return np.asarray(chart.between(before, after, place)[0])

@@ -12,7 +12,8 @@ from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
 from cfplan_core.planning.bounds import Bound
-from cfplan_core.planning.manifold import independent_rows, project
+from cfplan_core.planning.equations import equation_gradients
+from cfplan_core.planning.manifold import formation_equations, project
 from cfplan_core.planning.search import Leg
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
@@ -159,11 +160,10 @@ def _parts(tracer: Tracer, leg: Leg, z: FloatArray) -> list[tuple[Stability, Flo
 
 def _middles(system: ContactSystem, leg: Leg, before: FloatArray, after: FloatArray) -> FloatArray:
     """Points of a formation's manifold half way between neighbours, each of shape (s, 3 + n)."""
-    pairs = leg.formation.array
-    gradients = gap_gradients(system, system.place(before), pairs)
-    rows = list(independent_rows(gradients[0]))
-    basis = np.linalg.svd(gradients[:, rows])[2][:, len(rows) :]
-    return project(system, pairs[rows], before, basis, 0.5 * (before + after)).points
+    rows, _ = formation_equations(system, leg.formation.array, before[0])
+    gradients = equation_gradients(system, before, rows)
+    basis = np.linalg.svd(gradients)[2][:, len(rows) :]
+    return project(system, rows, before, basis, 0.5 * (before + after)).points
 
 
 def _torque_limits(

@@ -7,13 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cfplan_core.verification.mechanism import Mechanism, Scene
+from cfplan_core.verification.mechanism import FloatArray, Mechanism, Scene
 from cfplan_core.verification.statics import balance_of
 from cfplan_core.verification.touching import Pair, locate
 
 ROUNDS = 8
 ON_CONTACT = 1e-10
 """Gap by size at which a configuration is on its contacts."""
+
+STEP = 1e-5
+"""Step of the finite differences, by the object's size and in rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +40,11 @@ class Halfway:
 
 
 def halfway(
-    mechanism: Mechanism, before: Scene, after: Scene, contacts: Sequence[Pair]
+    mechanism: Mechanism,
+    before: Scene,
+    after: Scene,
+    contacts: Sequence[Pair],
+    balanced: bool = False,
 ) -> Halfway:
     """Go half-way between two frames and then, by Gauss-Newton, to the contacts.
 
@@ -49,6 +56,7 @@ def halfway(
         before: The first frame.
         after: The second.
         contacts: Those of the segment.
+        balanced: True to go, for two contacts, to where they also balance the object.
     """
     # Object frame position in sizes, then angles.
     unit = np.concatenate([[mechanism.size] * 2, np.ones(1 + len(before.joints))])
@@ -63,17 +71,22 @@ def halfway(
         gaps = np.array([touch.gap for _, touch in placed]) / mechanism.size
         if k == 0:
             first_gap = max(touch.distance for _, touch in placed)
-        if float(np.abs(gaps).max()) < ON_CONTACT:
+        balance = balance_of(mechanism, scene, placed)
+        off = gaps
+        if balanced:
+            off = np.append(gaps, _imbalance(mechanism, state * unit, contacts))
+        if float(np.abs(off).max()) < ON_CONTACT:
             reached = True
             break
-        balance = balance_of(mechanism, scene, placed)
         # The wrenches are about the centre of mass, the state has the object frame's origin.
         origin = complex(*(state * unit)[:2])
         arm = (scene.center - origin) / mechanism.size
         slopes = balance.wrenches.T.copy()
         slopes[:, 2] += arm.real * slopes[:, 1] - arm.imag * slopes[:, 0]
         slopes = np.hstack([slopes, -balance.lever_arms])
-        state = state - np.linalg.lstsq(slopes, gaps, rcond=1e-9)[0]
+        if balanced:
+            slopes = np.vstack([slopes, _imbalance_slope(mechanism, state, unit, contacts)])
+        state = state - np.linalg.lstsq(slopes, off, rcond=1e-9)[0]
     size = float(np.linalg.norm(step))
     return Halfway(
         scene=scene,
@@ -83,3 +96,24 @@ def halfway(
         detour=float(np.linalg.norm(state - middle)) / max(size, 1e-6),
         reached=reached,
     )
+
+
+def _imbalance(mechanism: Mechanism, state: FloatArray, contacts: Sequence[Pair]) -> float:
+    """Determinant of two wrenches and the load, zero where they lie in a plane; SI units."""
+    scene = mechanism.scene(state[:3], state[3:])
+    balance = balance_of(mechanism, scene, [(pair, locate(pair, scene)) for pair in contacts])
+    return float(np.linalg.det(np.column_stack([balance.wrenches, balance.load])))
+
+
+def _imbalance_slope(
+    mechanism: Mechanism, state: FloatArray, unit: FloatArray, contacts: Sequence[Pair]
+) -> FloatArray:
+    """Differentiate `_imbalance` by a state in object sizes and rad, by central differences."""
+    steps = STEP * np.eye(len(state))
+    return np.array(
+        [
+            _imbalance(mechanism, (state + step) * unit, contacts)
+            - _imbalance(mechanism, (state - step) * unit, contacts)
+            for step in steps
+        ]
+    ) / (2.0 * STEP)

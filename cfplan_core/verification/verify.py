@@ -120,7 +120,9 @@ def _check_steps(
     mechanism: Mechanism, stretch: Stretch, scenes: Scenes, events: Events, record: Recorder
 ) -> None:
     for frame in range(stretch.first + 1, stretch.last + 1):
-        middle = halfway(mechanism, scenes[frame - 1], scenes[frame], stretch.contacts)
+        balanced = stretch.stability == 'second_order' and len(stretch.contacts) == 2
+        before, after = scenes[frame - 1], scenes[frame]
+        middle = halfway(mechanism, before, after, stretch.contacts, balanced)
         bend = max(0.0, middle.gap - TOUCH) / (mechanism.lever * max(middle.turn, 1e-9) ** 2)
         half = 'half-way from the frame before'
         what = f'gap of {middle.gap:.3g} m {half}, divided by lever and turn squared,'

@@ -222,11 +222,26 @@ def test_limits_of_a_batch_are_those_of_each() -> None:
     assert np.isfinite(lower).any()
 
 
-@pytest.mark.parametrize('count', [0, 1, 2])
-def test_two_contacts_have_no_torque_limits(count: int) -> None:
+@pytest.mark.parametrize('count', [0, 1])
+def test_one_contact_has_no_torque_limits(count: int) -> None:
     rows = np.array([row(-1.0, -1.0, math.pi / 2, 0.5), row(1.0, -1.0, math.pi / 2, 0.5)])
     lower, upper = FrictionlessModel(DOWN).torque_limits(rows[None, :count])
     assert lower.shape == upper.shape == (1, 1)
+    assert np.isnan([lower, upper]).all()
+
+
+def test_two_contacts_beside_the_weight_have_one_torque() -> None:
+    """Half of the weight rests on each, with a lever of one half."""
+    rows = np.array([row(-1.0, -1.0, math.pi / 2, 0.5), row(1.0, -1.0, math.pi / 2, 0.5)])
+    lower, upper = FrictionlessModel(DOWN).torque_limits(rows[None])
+    np.testing.assert_allclose([lower, upper], [[[-0.5]], [[-0.5]]])
+
+
+@pytest.mark.parametrize('shift', [1e-3, 3.0])
+def test_two_contacts_that_do_not_balance_have_no_torque_limits(shift: float) -> None:
+    rows = np.array([row(-1.0, -1.0, math.pi / 2, 0.5), row(1.0, -1.0, 1.5, 0.5)])
+    rows[0, 2] += shift
+    lower, upper = FrictionlessModel(DOWN).torque_limits(rows[None])
     assert np.isnan([lower, upper]).all()
 
 
