@@ -308,6 +308,7 @@ EVERYTHING = PlanOptions(
     stay_within=((-0.1, 0.0), (0.1, 0.0), (0.0, 0.1)),
     prefer=Preference.ROBUST,
     alternatives=3,
+    second_order=False,
 )
 
 
