@@ -258,7 +258,8 @@ class _Planning:
         whole = [(leg.formation, self.moving.expanded(leg.points)) for leg in legs]
         margin = robustness.margin(whole)
         message = self._verdict_of_all(stopped, margin, best)
-        return replace(self._solved(legs, message), margin=margin)
+        bound = None if best is None else best.bound
+        return replace(self._solved(legs, message), margin=margin, margin_bound=bound)
 
     def _met(self, pieces: int) -> None:
         self._grown(pieces, 1)
