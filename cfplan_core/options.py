@@ -32,8 +32,8 @@ class PlanOptions:
         time_budget: Seconds, or None for no limit.
         max_nodes: Nodes of both trees together, or None for no limit.
         resolution: Spacing of the grid of joint angles, rad, over which contact formations of
-            dimension 2 are explored; for hands of two joints. With constraints, preferences or
-            alternatives they are explored along rays instead.
+            dimension 2 are explored; for hands of two joints. For alternatives, and first of all
+            with constraints, they are explored along rays instead.
         max_needed_force: Largest force, in weights of the object, that the contacts may need to
             hold it in any frame of the plan, or None for no limit.
         max_contacts: Largest number of contacts in any configuration that is passed through, also

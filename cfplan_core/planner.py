@@ -352,7 +352,8 @@ class _Planning:
         assert legs is not None
         margin = self._margin(legs)
         message = self._verdict_of_all(stopped, margin, best)
-        return replace(self._solved(legs, message), margin=margin)
+        bound = None if best is None else best.bound
+        return replace(self._solved(legs, message), margin=margin, margin_bound=bound)
 
     def _met(self, pieces: int) -> None:
         self._grown(pieces, 1)
