@@ -42,6 +42,7 @@ def constraint_values(message: OptionsMessage, setup: Setup) -> dict[str, Any]:
         'required': tuple(contact_names(formation) for formation in message.required),
         'held_joints': tuple(message.held_joints),
         'stay_within': tuple((float(p.x), float(p.y)) for p in message.stay_within) or None,
+        'second_order': not message.no_second_order,
     }
 
 
@@ -85,6 +86,7 @@ def constraint_message(options: PlanOptions) -> OptionsMessage:
         required=[formation_message(names) for names in options.required],
         held_joints=list(options.held_joints),
         stay_within=[Point(x=float(x), y=float(y), z=0.0) for x, y in options.stay_within or ()],
+        no_second_order=not options.second_order,
     )
 
 
