@@ -69,16 +69,6 @@ def resolution_option(command: click.decorators.FC) -> click.decorators.FC:
     )(command)
 
 
-def second_order_option(command: click.decorators.FC) -> click.decorators.FC:
-    """Option for grasps that are stable to second order."""
-    return click.option(
-        '--second-order/--no-second-order',
-        default=True,
-        show_default=True,
-        help='Whether two contacts may hold the object at a strict minimum of its energy.',
-    )(command)
-
-
 def wanted_plan(command: Command) -> Command:
     """Add the options to a command."""
     options = [
