@@ -74,8 +74,8 @@ class PlanOptions:
         time_budget: Seconds, or None for no limit.
         max_nodes: Nodes of both trees together, or None for no limit.
         resolution: Spacing of the grid of joint angles, rad, over which contact formations of
-            dimension 2 are explored; for hands of two joints. With constraints, preferences or
-            alternatives they are explored along rays instead.
+            dimension 2 are explored; for hands of two joints. For alternatives, and first of all
+            with constraints, they are explored along rays instead.
         max_needed_force: Largest force, in weights of the object, that the contacts may need to
             hold it in any frame of the plan, or None for no limit.
         max_contacts: Largest number of contacts in any configuration that is passed through, also
@@ -91,6 +91,8 @@ class PlanOptions:
             better one can exist or a budget is exhausted.
         alternatives: Number of plans wanted, with different sequences of contact formations.
         trajectory: How the path becomes a trajectory.
+        seed: Of the generator that searches of hands with more than two joints draw from; the
+            same seed gives the same plan.
     """
 
     time_budget: float | None = None
@@ -106,6 +108,7 @@ class PlanOptions:
     prefer: Preference = Preference.FIRST
     alternatives: int = 1
     trajectory: TrajectoryOptions = TrajectoryOptions()
+    seed: int = 0
 
     @property
     def optimal(self) -> bool:
@@ -131,6 +134,8 @@ class PlanOptions:
             raise CfplanError(
                 f'alternatives: got {self.alternatives}, expected a number above zero'
             )
+        if self.seed < 0:
+            raise CfplanError(f'seed: got {self.seed}, expected a whole number from 0')
         for field in ('forbidden', 'required'):
             if any(isinstance(names, str) or not names for names in getattr(self, field)):
                 raise CfplanError(

@@ -111,6 +111,7 @@ class PlanResult:
             with the widest margin. Empty where it was not planned.
         entry_nominal: As `entry_lower`.
         margin: Worst robustness margin of the plan, where it was chosen among several, else None.
+        margin_bound: No plan has a larger margin, at the resolution stated; None if not asked.
         alternatives: Other plans, the next best first, each without further ones.
         findings: Everything that is wrong, if invalid. Not in plan files.
     """
@@ -133,6 +134,7 @@ class PlanResult:
     torque_nominal: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     entry_nominal: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     margin: float | None = None
+    margin_bound: float | None = None
     alternatives: tuple[PlanResult, ...] = ()
     findings: tuple[Finding, ...] = ()
 

@@ -23,6 +23,7 @@ from cfplan_core import (
     Preference,
     Problem,
     Tolerance,
+    TrajectoryOptions,
     load_problem,
     plan,
 )
@@ -306,8 +307,11 @@ EVERYTHING = PlanOptions(
     required=(tuple(CONTACTS[1:]),),
     held_joints=('left_joint',),
     stay_within=((-0.1, 0.0), (0.1, 0.0), (0.0, 0.1)),
+    second_order=False,
     prefer=Preference.ROBUST,
     alternatives=3,
+    trajectory=TrajectoryOptions(2.0, 0.1, 0.02, 0.5),
+    seed=5,
 )
 
 
