@@ -20,6 +20,7 @@ from cfplan_core.planning.best_first import BestFirst
 from cfplan_core.planning.best_on_mesh import Best, BestOnMesh
 from cfplan_core.planning.constraints import (
     REASONS,
+    Constraints,
     compile_constraints,
     contradictions,
 )
@@ -121,9 +122,14 @@ class _Planning:
         if self.options.held_joints:
             self.moving = HeldSystem(self.system, self.options.held_joints, start)
             start = self.moving.reduced(start)
-        # Alternatives are told apart along rays.
-        resolution = self.options.resolution if self.options.alternatives == 1 else None
-        self.roadmap = Roadmap(self.moving, self.model, self._checkpoint, constraints, resolution)
+        # Where curves hardly ever lead on rays find a way sooner; only sheets tell that there is
+        # none. Alternatives are told apart along rays.
+        free = constraints.none and self.moving is self.system
+        several = self.options.alternatives > 1
+        quick = self.moving.joint_count == MOST_JOINTS and not (free or self.options.optimal)
+        along_rays = self._roadmap(constraints, None)
+        on_sheets = self._roadmap(constraints, self.options.resolution)
+        self.roadmap = along_rays if several or quick else on_sheets
         try:
             goals = self._goals(examined)
         except CfplanError as error:
@@ -141,8 +147,10 @@ class _Planning:
                     return best
                 legs = None
             else:
-                found = (self._search(start, goal) for goal in goals)
-                legs = next((legs for legs in found if legs is not None), None)
+                legs = self._search_goals(start, goals)
+                if legs is None and quick:
+                    self.roadmap = on_sheets
+                    legs = self._search_goals(start, goals)
         except _BudgetExhaustedError as stop:
             return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
         if legs is None:
@@ -174,6 +182,15 @@ class _Planning:
         if part == 'options' and name.isidentifier():
             finding = Finding('<problem>', f'{part}.{name}', rest, '')
         return replace(self._answer(Status.INVALID, message), findings=(finding,))
+
+    def _search_goals(
+        self, start: FloatArray, goals: Sequence[FloatArray | GoalTest]
+    ) -> Sequence[Leg] | None:
+        found = (self._search(start, goal) for goal in goals)
+        return next((legs for legs in found if legs is not None), None)
+
+    def _roadmap(self, constraints: Constraints, resolution: float | None) -> Roadmap:
+        return Roadmap(self.moving, self.model, self._checkpoint, constraints, resolution)
 
     def _solved(self, legs: Sequence[Leg], message: str) -> PlanResult:
         """The answer for a path, with the trees of the search that found it."""
@@ -315,7 +332,7 @@ class _Planning:
             f'formations explored{rays if regions else ""}'
         )
 
-    def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> list[Leg] | None:
+    def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> Sequence[Leg] | None:
         """Search until a path is found that the joints' efforts can hold.
 
         Efforts are looked at on paths only: points and curves that need more than a joint's limit
@@ -326,7 +343,8 @@ class _Planning:
         while True:
             self.search = search = Search(self.roadmap, start, goal, blocked, self._grown)
             if not search.run():
-                return None
+                weak = self.roadmap.failures[TOO_WEAK] > 0
+                return self._search_strong(start, goal) if weak else None
             legs = search.path()
             refused = self._refuse(legs)
             if not refused:
@@ -343,6 +361,17 @@ class _Planning:
                         self.roadmap.regions.drop(piece, z)
                 else:
                     blocked |= {piece.index}
+
+    def _search_strong(
+        self, start: FloatArray, goal: FloatArray | GoalTest
+    ) -> Sequence[Leg] | None:
+        """Search all that can be reached without what the joints cannot hold, if that is known."""
+        if self.moving.joint_count > MOST_JOINTS:
+            return None
+        robustness = Robustness(self.system, self.model)
+        mesh = BestOnMesh(self.roadmap, start, goal, robustness, self.moving.expanded, self._met)
+        best = mesh.choose(Preference.FEWEST_SEGMENTS, None, self._refuse)
+        return None if best is None else best.legs
 
     def _checkpoint(self) -> None:
         """Stop the search when it has to."""

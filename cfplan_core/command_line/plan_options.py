@@ -47,6 +47,16 @@ def corners(
     return tuple(read)
 
 
+def second_order_option(command: click.decorators.FC) -> click.decorators.FC:
+    """Option for grasps that are stable to second order."""
+    return click.option(
+        '--second-order/--no-second-order',
+        default=True,
+        show_default=True,
+        help='Whether two contacts may hold the object at a strict minimum of its energy.',
+    )(command)
+
+
 def resolution_option(command: click.decorators.FC) -> click.decorators.FC:
     """Option for the spacing of the grid of joint angles."""
     return click.option(
@@ -56,16 +66,6 @@ def resolution_option(command: click.decorators.FC) -> click.decorators.FC:
         show_default=True,
         metavar='RAD',
         help='Spacing of the grid of joint angles that regions are explored over.',
-    )(command)
-
-
-def second_order_option(command: click.decorators.FC) -> click.decorators.FC:
-    """Option for grasps that are stable to second order."""
-    return click.option(
-        '--second-order/--no-second-order',
-        default=True,
-        show_default=True,
-        help='Whether two contacts may hold the object at a strict minimum of its energy.',
     )(command)
 
 

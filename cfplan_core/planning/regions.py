@@ -61,14 +61,20 @@ class Regions:
         regions = sum(piece.dimension > 1 for piece in self._roadmap.pieces)
         if not regions:
             return (
-                'everything that can be reached with first-order stability was explored: no '
-                'region of dimension 2 or more, and curves in steps of at most '
-                f'{STEP:g} rad and object sizes'
+                f'{self._everything()} was explored: no region of dimension 2 or more, and '
+                f'curves in steps of at most {STEP:g} rad and object sizes'
             )
         return (
             'contact formations of dimension 0 and 1 were searched completely, '
             f'{regions} regions of dimension 2 and more only along rays'
         )
+
+    def _everything(self) -> str:
+        """Say which stability everything that was explored has."""
+        order = (
+            'of first or second order' if self._roadmap.model.second_order else 'of first order'
+        )
+        return f'everything that can be reached with stability {order}'
 
     def around(self, formation: Formation, z: FloatArray) -> Region:
         """Return the region of a formation that a stable configuration lies inside."""
@@ -105,6 +111,7 @@ class Regions:
                     for at, piece in found
                     if apart(at) or (piece is not region and index != region.index)
                 ]
+        self._roadmap.settling.drop(region, z)
 
     def reach(
         self, region: Region, goal: GoalRegion, near: FloatArray | None

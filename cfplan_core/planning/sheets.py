@@ -67,11 +67,10 @@ class Sheets(Regions):
         """Say how completely regions were explored."""
         vertices = sum(len(sheet.vertices) for sheet in self.sheets)
         return (
-            'everything that can be reached with first-order stability was explored: curves in '
-            f'steps of at most {STEP:g} rad and object sizes, {len(self.sheets)} regions of '
-            f'dimension 2 at {vertices} configurations over a grid of joint angles of '
-            f'{self.grid.spacing:g} rad, or finer in small regions, down to '
-            f'{self.grid.finest:g} rad'
+            f'{self._everything()} was explored: curves in steps of at most {STEP:g} rad and '
+            f'object sizes, {len(self.sheets)} regions of dimension 2 at {vertices} '
+            f'configurations over a grid of joint angles of {self.grid.spacing:g} rad, or finer '
+            f'in small regions, down to {self.grid.finest:g} rad'
         )
 
     def around(self, formation: Formation, z: FloatArray) -> Region:
