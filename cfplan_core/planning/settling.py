@@ -81,12 +81,16 @@ class Settling:
             yield from self._on_border(piece)
         if piece.dimension != 1:
             return
-        for end, z in zip(piece.ends, (piece.points[0], piece.points[-1]), strict=True):
+        for end, place in zip(piece.ends, (0, -1), strict=True):
             if end is not None:
                 yield end.z
             elif piece.stability is not Stability.SECOND_ORDER:
-                located = self.locate(piece.formation, z)
+                located = self.locate(piece.formation, piece.points[place])
                 if located is not None:
+                    # The curve ends there, not by a hair before.
+                    points = piece.points.copy()
+                    points[place] = located
+                    piece.points = points
                     yield located
 
     def _on_border(self, region: Region) -> Iterator[FloatArray]:

@@ -38,11 +38,12 @@ def constraint_values(message: OptionsMessage, setup: Setup) -> dict[str, Any]:
         'resolution': float(message.resolution) or setup.default_resolution,
         'max_needed_force': float(message.max_needed_force) or None,
         'max_contacts': int(message.max_contacts) or None,
-        'second_order': not message.no_second_order,
         'forbidden': tuple(contact_names(formation) for formation in message.forbidden),
         'required': tuple(contact_names(formation) for formation in message.required),
         'held_joints': tuple(message.held_joints),
         'stay_within': tuple((float(p.x), float(p.y)) for p in message.stay_within) or None,
+        'second_order': not message.no_second_order,
+        'seed': int(message.seed),
     }
 
 
@@ -83,6 +84,7 @@ def constraint_message(options: PlanOptions) -> OptionsMessage:
         max_needed_force=float(options.max_needed_force or 0.0),
         max_contacts=options.max_contacts or 0,
         no_second_order=not options.second_order,
+        seed=options.seed,
         forbidden=[formation_message(names) for names in options.forbidden],
         required=[formation_message(names) for names in options.required],
         held_joints=list(options.held_joints),

@@ -306,9 +306,10 @@ EVERYTHING = PlanOptions(
     required=(tuple(CONTACTS[1:]),),
     held_joints=('left_joint',),
     stay_within=((-0.1, 0.0), (0.1, 0.0), (0.0, 0.1)),
+    second_order=False,
     prefer=Preference.ROBUST,
     alternatives=3,
-    second_order=False,
+    seed=5,
 )
 
 
