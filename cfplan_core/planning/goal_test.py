@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfplan_core.contact.system import ContactSystem, IntArray
+from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Goal
 from cfplan_core.planning.goal_curves import CurveGoal
@@ -39,16 +39,6 @@ class GoalTest:
         self.region = GoalRegion(system, goal)
         self.nearest: FloatArray | None = None
         self._least = np.inf
-
-    @property
-    def columns(self) -> IntArray:
-        """Coordinates of z that the goal gives, shape (m,)."""
-        return self.region.columns
-
-    @property
-    def wanted(self) -> FloatArray:
-        """Their values, shape (m,)."""
-        return self.region.wanted
 
     def __call__(self, piece: Piece) -> FloatArray | None:
         """Return the configuration of a point or a curve, shape (3 + n,), nearest to the goal.
