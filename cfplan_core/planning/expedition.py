@@ -124,7 +124,7 @@ class Expedition:
 
     def run(self) -> bool:
         """Grow until the trees meet (true) or the drives are used up (false)."""
-        if len(self._growths) > 1 and self._arrived(0, self._growths[0].milestones[0]):
+        if self._arrived(0, self._growths[0].milestones[0]):
             return True
         turn = 0
         while self._met is None and self.drives < self._most_drives:
