@@ -5,18 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import networkx as nx
-import numpy as np
 
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.errors import CfplanError, InvalidProblemError
-from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Problem
 from cfplan_core.options import RESOLUTION
 from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.pieces import Piece
 from cfplan_core.planning.roadmap import Roadmap
-from cfplan_core.planning.sheet_graph import Sheet
+from cfplan_core.planning.sheet_graph import configurations as configurations
 
 # Hands for which exploration ends, and is complete.
 MOST_JOINTS = 2
@@ -53,12 +51,10 @@ class Exploration:
 
     def others(self) -> list[Piece]:
         """Pieces that cannot be reached from the start, but from the goal, if that is a grasp."""
-        goal = self.problem.goal.grasp(self.problem.hand)
+        goal = examine_problem(self.system, self.roadmap.model).goal
         if goal is None or self.goal is not None:
             return []
-        z = examine_problem(self.system, self.roadmap.model).goal
-        assert z is not None
-        graph = _reachable(self.roadmap, self.roadmap.root(z.z))
+        graph = _reachable(self.roadmap, self.roadmap.root(goal.z))
         return [self.roadmap.pieces[index] for index in sorted(graph)]
 
 
@@ -126,8 +122,3 @@ def _attributes(roadmap: Roadmap, piece: Piece) -> dict[str, object]:
         'lower': dict(zip(names, points[:, 3:].min(axis=0).tolist(), strict=True)),
         'upper': dict(zip(names, points[:, 3:].max(axis=0).tolist(), strict=True)),
     }
-
-
-def configurations(piece: Piece) -> FloatArray:
-    """Configurations of a piece that were looked at, shape (s, 3 + n)."""
-    return np.array(piece.vertices) if isinstance(piece, Sheet) else piece.points

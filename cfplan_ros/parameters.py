@@ -14,6 +14,7 @@ from ament_index_python.packages import PackageNotFoundError, get_package_share_
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
 from cfplan_core.errors import CfplanError
+from cfplan_core.options import RESOLUTION, Preference
 from cfplan_ros.conversions.hands import load_hand, load_object
 from cfplan_ros.conversions.requests import Setup
 from cfplan_ros.visualization.frames import OBJECT_FRAME, WORLD_FRAME, base_frame, link_frame
@@ -104,6 +105,19 @@ TABLE = (
         (0.001, 86400.0),
     ),
     Row(
+        'default_preference',
+        'first',
+        'Which plan to choose for requests that do not say: first, fewest-segments, shortest or '
+        'robust.',
+    ),
+    Row(
+        'default_resolution',
+        RESOLUTION,
+        'Spacing of the grid of joint angles that contact formations are explored over [rad], of '
+        'requests that give none.',
+        (0.001, 1.0),
+    ),
+    Row(
         'queue_length',
         10,
         'Requests kept waiting while a plan is computed; one more is answered with BUSY. '
@@ -148,6 +162,8 @@ class Settings:
     frame_id: str
     default_time_budget: float
     maximal_time_budget: float
+    default_preference: str
+    default_resolution: float
     queue_length: int
     publish: bool
     record: bool
@@ -189,6 +205,8 @@ class Configuration:
             frame_id=settings.frame_id,
             default_time_budget=settings.default_time_budget,
             maximal_time_budget=settings.maximal_time_budget,
+            default_preference=settings.default_preference,
+            default_resolution=settings.default_resolution,
         )
 
 
@@ -292,6 +310,12 @@ def _faults_of_values(settings: Settings) -> Iterable[str]:
         yield (
             f'default_time_budget: got {settings.default_time_budget:g} s, expected at most '
             f'maximal_time_budget, {settings.maximal_time_budget:g} s'
+        )
+    choices = [choice.value for choice in Preference]
+    if settings.default_preference not in choices:
+        yield (
+            f'default_preference: got {settings.default_preference!r}, expected one of '
+            f'{", ".join(choices)}'
         )
     if '\0' in settings.record_directory:
         yield 'record_directory: got a null byte, expected a path'

@@ -10,6 +10,7 @@ from typing import Any
 from cfplan_msgs.srv import PlanManipulation
 
 from cfplan_core import PlanOptions, Problem, Status, plan
+from cfplan_ros.conversions.options import options_mapping
 from cfplan_ros.conversions.plans import refusal, response_of
 from cfplan_ros.conversions.requests import (
     InvalidRequestError,
@@ -88,10 +89,7 @@ class Task:
             return {}
         return {
             'problem': problem_mapping(self.request, self.setup),
-            'options': {
-                'time_budget': self.options.time_budget,
-                'max_nodes': self.options.max_nodes,
-            },
+            'options': options_mapping(self.options),
         }
 
 

@@ -39,7 +39,7 @@ def check(file: Path) -> int:
     console.print(_bodies(problem), _joints(problem))
     _print_grasp('Start', problem, problem.start, console)
     goal = problem.goal.grasp(problem.hand)
-    if goal is not None:
+    if goal is not None and not problem.goal.tolerance.wide:
         _print_grasp('Goal', problem, goal, console)
     else:
         _print_partial_goal(problem.goal, console)
@@ -87,12 +87,17 @@ def _print_grasp(title: str, problem: Problem, grasp: Grasp, console: Console) -
 def _print_partial_goal(goal: Goal, console: Console) -> None:
     """Print a goal that leaves something open: its formation is not known before planning."""
     console.print('The goal is given in part; the rest is free')
+    tolerance = goal.tolerance
     if goal.contacts:
-        console.print(_formation('Goal contacts', goal.contacts))
-    if goal.object_pose is not None:
-        console.print(_pose(goal.object_pose))
+        title = 'Goal contact formation' if goal.exact_contacts else 'Goal contacts, or more'
+        console.print(_formation(title, goal.contacts))
+    if goal.object_position is not None:
+        x, y = goal.object_position
+        console.print(f'object at ({x:.4g}, {y:.4g}) m, within {tolerance.position:g} m')
+    if goal.object_angle is not None:
+        console.print(f'object at {goal.object_angle:.4g} rad, within {tolerance.angle:g} rad')
     if goal.joints:
-        console.print(_angles(goal.joints.items()))
+        console.print(f'{_angles(goal.joints.items())}, within {tolerance.joints:g} rad')
 
 
 def _pose(object_pose: FloatArray) -> str:

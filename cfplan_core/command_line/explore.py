@@ -10,31 +10,10 @@ from rich.table import Table
 
 from cfplan_core.command_line.console import answers, new_table
 from cfplan_core.command_line.inputs import examine
+from cfplan_core.command_line.plan_options import resolution_option, second_order_option
 
 if TYPE_CHECKING:
     from cfplan_core.exploration import Exploration
-
-
-def resolution_option(command: click.decorators.FC) -> click.decorators.FC:
-    """Option for the spacing of the grid of joint angles."""
-    return click.option(
-        '--resolution',
-        type=click.FloatRange(0.001, 1.0),
-        default=0.05,
-        show_default=True,
-        metavar='RAD',
-        help='Spacing of the grid of joint angles that regions are explored over.',
-    )(command)
-
-
-def second_order_option(command: click.decorators.FC) -> click.decorators.FC:
-    """Option for grasps that are stable to second order."""
-    return click.option(
-        '--second-order/--no-second-order',
-        default=True,
-        show_default=True,
-        help='Whether two contacts may hold the object at a strict minimum of its energy.',
-    )(command)
 
 
 @click.command(short_help='List all contact formations that can be reached.')

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from cfplan_core.command_line.console import answers
-from cfplan_core.command_line.explore import resolution_option, second_order_option
 from cfplan_core.command_line.inputs import examine
+from cfplan_core.command_line.plan_options import resolution_option, second_order_option
 from cfplan_core.errors import CfplanError
 
 

@@ -121,10 +121,6 @@ def plan(
     # Files first: they must be there even if the reader of the tables leaves early.
     if json_path is not None:
         write_result(result, json_path)
-        for number, other in enumerate(result.alternatives, 2):
-            write_result(
-                other, json_path.with_name(f'{json_path.stem}.{number}{json_path.suffix}')
-            )
     figures: list[Path] = []
     if figure_directory is not None and result.status is not Status.INVALID:
         from cfplan_core.report.figures import write_figures
@@ -194,10 +190,12 @@ def _invalid(examined: Examined, file: Path, error: InvalidProblemError) -> Plan
 
 
 def write_result(result: PlanResult, path: Path) -> None:
-    """Write a result of any status as JSON."""
+    """Write a result of any status as JSON, and its alternatives beside it."""
     from cfplan_core.trajectory.plan_file import write_plan
 
     write_plan(result, path)
+    for number, other in enumerate(result.alternatives, 2):
+        write_plan(other, path.with_name(f'{path.stem}.{number}{path.suffix}'))
 
 
 def print_result(problem: Problem, result: PlanResult, figures: list[Path]) -> None:

@@ -1,4 +1,4 @@
-"""Options of ``cfplan plan`` that say which plan is wanted."""
+"""Options of ``cfplan plan`` and ``cfplan call`` that say which plan is wanted."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import click
-
-from cfplan_core.command_line.explore import second_order_option
 
 PREFERENCES = ('first', 'fewest-segments', 'shortest', 'robust')
 
@@ -47,6 +45,28 @@ def corners(
             raise click.BadParameter(f'{corner!r} is no corner x,y in m.') from None
         read.append((x, y))
     return tuple(read)
+
+
+def second_order_option(command: click.decorators.FC) -> click.decorators.FC:
+    """Option for grasps that are stable to second order."""
+    return click.option(
+        '--second-order/--no-second-order',
+        default=True,
+        show_default=True,
+        help='Whether two contacts may hold the object at a strict minimum of its energy.',
+    )(command)
+
+
+def resolution_option(command: click.decorators.FC) -> click.decorators.FC:
+    """Option for the spacing of the grid of joint angles."""
+    return click.option(
+        '--resolution',
+        type=click.FloatRange(0.001, 1.0),
+        default=0.05,
+        show_default=True,
+        metavar='RAD',
+        help='Spacing of the grid of joint angles that regions are explored over.',
+    )(command)
 
 
 def wanted_plan(command: Command) -> Command:
@@ -109,7 +129,14 @@ def wanted_plan(command: Command) -> Command:
             help='Keep the object inside this convex polygon: corners in m, counter-clockwise.',
         ),
         second_order_option,
+        click.option(
+            '--seed',
+            type=click.IntRange(min=0),
+            default=0,
+            metavar='N',
+            help='Draw from another generator, for hands of more than two joints.',
+        ),
     ]
-    for option in reversed(options):
+    for option in reversed([*options, resolution_option]):
         command = option(command)
     return command

@@ -117,6 +117,10 @@ def _goal(document: Document, hand: Hand) -> Goal:
     angles = document.get('goal', 'joints') or {}
     joints = {name: float(angles[name]) for name in hand.joint_names if name in angles}
     contacts = document.get('goal', 'contacts')
+    # Beside a pose they are faults, see `content_faults`.
+    position, orientation = (
+        document.get('goal', key) if pose is None else None for key in ('position', 'orientation')
+    )
     return Goal(
         object_pose=None if pose is None else np.array(pose, dtype=np.float64),
         joints=joints or None,
@@ -128,6 +132,9 @@ def _goal(document: Document, hand: Hand) -> Goal:
                 if (value := document.get('goal', 'tolerance', key)) is not None
             }
         ),
+        position=None if position is None else np.array(position, dtype=np.float64),
+        orientation=None if orientation is None else float(orientation),
+        exact_contacts=bool(document.get('goal', 'exact_contacts') and contacts),
     )
 
 

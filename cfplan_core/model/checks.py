@@ -39,6 +39,7 @@ def content_faults(document: Document) -> Iterator[Fault]:
     yield from _hand_faults(document)
     yield from _angle_faults(document)
     yield from _contact_faults(document)
+    yield from _goal_faults(document)
 
 
 def polygon_paths(document: Document) -> list[Path]:
@@ -171,7 +172,10 @@ def _angle_faults(document: Document) -> Iterator[Fault]:
             limits = document.get(*joints[name], 'limits')
             if angle is None or limits is None or limits[0] >= limits[1]:
                 continue
-            if not limits[0] - ROUNDING <= angle <= limits[1] + ROUNDING:
+            slack = ROUNDING
+            if grasp == 'goal':
+                slack = max(slack, document.get('goal', 'tolerance', 'joints') or 0.0)
+            if not limits[0] - slack <= angle <= limits[1] + slack:
                 yield Fault(
                     path,
                     shown(angle),
@@ -207,6 +211,25 @@ def _contact_faults(document: Document) -> Iterator[Fault]:
                     shown(name),
                     f'an element of {body} from {kind}0 to {kind}{count - 1}, not {kind}{index}',
                 )
+
+
+def _goal_faults(document: Document) -> Iterator[Fault]:
+    """Parts of a goal that are given twice, or that say nothing without another."""
+    for key in ('position', 'orientation'):
+        if document.has('goal', 'object_pose') and document.has('goal', key):
+            yield Fault(
+                ('goal', key),
+                f'{shown(document.get("goal", key))} beside object_pose',
+                'one of them: a pose has both position and orientation',
+                usable=True,
+            )
+    if document.get('goal', 'exact_contacts') and not document.has('goal', 'contacts'):
+        yield Fault(
+            ('goal', 'exact_contacts'),
+            'true without contacts',
+            'contacts that it is about',
+            usable=True,
+        )
 
 
 def _vertex_counts(document: Document) -> tuple[dict[str, int | None], bool]:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import FloatArray, centroid, diameter
 from cfplan_core.model.hand import Hand, frozen_array, transformed
 
@@ -66,34 +67,78 @@ class Tolerance:
     angle: float = 1e-3
     joints: float = 1e-3
 
+    @property
+    def wide(self) -> bool:
+        """True if more is allowed than a goal's numbers may be off for being rounded."""
+        usual = Tolerance()
+        return (
+            self.position > usual.position
+            or self.angle > usual.angle
+            or self.joints > usual.joints
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """What the last frame must be; at least one of the three is given.
+    """What the last frame must be; at least one of the parts is given, the others are free.
 
     Attributes:
         object_pose: Shape (3,), as in `Grasp`, or None for any.
         joints: Joint name to angle in rad; joints that are not named are free.
         contacts: Names of elemental contacts that must all touch, or None for any.
         tolerance: How exactly.
+        position: Shape (2,), x, y in m of the object's frame where its angle is free; beside
+            `object_pose` it is refused.
+        orientation: Angle of the object's frame in rad, turns counted, where its position is
+            free; beside `object_pose` it is refused.
+        exact_contacts: True if nothing but `contacts` may touch, so that they are the contact
+            formation.
+
+    Raises:
+        CfplanError: Position or orientation is given twice, or contacts are to be exact and none
+            is given.
     """
 
     object_pose: FloatArray | None = None
     joints: Mapping[str, float] | None = None
     contacts: tuple[str, ...] | None = None
     tolerance: Tolerance = field(default_factory=Tolerance)
+    position: FloatArray | None = None
+    orientation: float | None = None
+    exact_contacts: bool = False
 
     def __post_init__(self) -> None:
-        if self.object_pose is not None:
-            object.__setattr__(self, 'object_pose', frozen_array(self.object_pose, (3,)))
+        for name, shape in (('object_pose', (3,)), ('position', (2,))):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, frozen_array(value, shape))
+        for name in ('position', 'orientation'):
+            if self.object_pose is not None and getattr(self, name) is not None:
+                raise CfplanError(
+                    f'goal: got {name} beside object_pose, expected one of them: a pose has both'
+                )
+        if self.exact_contacts and not self.contacts:
+            raise CfplanError('goal: got exact_contacts without contacts, expected their names')
+
+    @property
+    def object_position(self) -> FloatArray | None:
+        """Shape (2,), x, y in m wanted of the object's frame, or None for any."""
+        return self.position if self.object_pose is None else self.object_pose[:2]
+
+    @property
+    def object_angle(self) -> float | None:
+        """Angle in rad wanted of the object's frame, or None for any."""
+        return self.orientation if self.object_pose is None else float(self.object_pose[2])
 
     def grasp(self, hand: Hand) -> Grasp | None:
         """Return the goal as a grasp if pose and every joint are given, else None."""
-        if self.object_pose is None or self.joints is None:
+        position, angle = self.object_position, self.object_angle
+        if position is None or angle is None or self.joints is None:
             return None
         if any(name not in self.joints for name in hand.joint_names):
             return None
-        return Grasp(self.object_pose, np.array([self.joints[name] for name in hand.joint_names]))
+        joints = np.array([self.joints[name] for name in hand.joint_names])
+        return Grasp(np.append(position, angle), joints)
 
 
 @dataclass(frozen=True, eq=False)

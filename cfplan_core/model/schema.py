@@ -160,4 +160,5 @@ _FORMS: Mapping[str, Any] = {
     'array': _list_form,
     'object': lambda schema: 'a mapping' + (', not empty' if 'minProperties' in schema else ''),
     'string': lambda schema: 'a text',
+    'boolean': lambda schema: 'true or false',
 }

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 
 import numpy as np
 
@@ -27,6 +28,9 @@ from cfplan_core.planning.region_motion import straight_motion
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.search import Leg, Node, Tree
 from cfplan_core.planning.ways import Arc, Cost, Label, joint_length
+
+# Configurations of one piece that are tried as ends of a way to a goal that is not a whole grasp.
+_MOST_ENDS = 8
 
 # Rates a motion inside a piece: its points, shape (s, 3 + n), in a formation.
 Rate = Callable[[Formation, FloatArray], float]
@@ -268,23 +272,13 @@ class BestFirst:
         """Labels at the goal behind the last motion, if a label's piece holds the goal."""
         if len(label.passed) < len(self._roadmap.constraints.required):
             return
-        if isinstance(self._goal, GoalTest):
-            z = self._fulfilled(self._goal, label)
-        else:
-            z = self._goal if label.piece is goal else None
-        if z is not None:
+        if not isinstance(self._goal, GoalTest):
+            if label.piece is goal:
+                yield from self._moved(label, self._goal, label.piece, arrived=True)
+            return
+        regions = self._roadmap.regions
+        for z in islice(self._goal.all(label.piece, regions, label.entry), _MOST_ENDS):
             yield from self._moved(label, z, label.piece, arrived=True)
-
-    def _fulfilled(self, test: GoalTest, label: Label) -> FloatArray | None:
-        if test.may_hold(label.piece) and test.fits(label.entry):
-            return label.entry
-        goal = test(label.piece)
-        if goal is not None or not isinstance(label.piece, Region):
-            return goal
-        if not test.may_hold(label.piece):
-            return None
-        reached = self._roadmap.regions.reach(label.piece, test.columns, test.wanted)
-        return next((z for z in reached if test.fits(z)), None)
 
     def _neighbours(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
         yield from self._roadmap.neighbours(piece)

@@ -11,7 +11,7 @@ from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.mesh import Motion, build_mesh, reachable
 from cfplan_core.planning.mesh_margins import MeshMargins
 from cfplan_core.planning.mesh_search import MeshSearch, Way
-from cfplan_core.planning.pieces import Piece, Region
+from cfplan_core.planning.pieces import Piece
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.robustness import Robustness, finer
 from cfplan_core.planning.search import Leg
@@ -81,16 +81,9 @@ class BestOnMesh:
             return [(piece, goal)] if piece in self.pieces else []
         found = []
         for piece in self.pieces:
-            if not goal.may_hold(piece):
-                continue
-            if piece is self.pieces[0] and goal.fits(start):
+            if piece is self.pieces[0] and goal.may_hold(piece) and goal.fits(start):
                 found.append((piece, start))
-            if isinstance(piece, Region):
-                reached = self._roadmap.regions.reach(piece, goal.columns, goal.wanted)
-                found += [(piece, z) for z in reached if goal.fits(z)]
-            else:
-                z = goal(piece)
-                found += [(piece, z)] if z is not None else []
+            found += [(piece, z) for z in goal.everywhere(piece, self._roadmap.regions)]
         return found
 
     def margin(self, legs: Sequence[Leg]) -> float:

@@ -168,17 +168,44 @@ def contradictions(
     for field, grasp in (('start', examined.start), ('goal', examined.goal)):
         if grasp is not None:
             findings += constraints.findings(system, grasp.z, grasp.pairs, field, _FILE)
+    # A grasp is meant as it is, anything else within its tolerance.
+    slack = _HELD if examined.goal is not None else max(_HELD, goal.tolerance.joints)
     for name in held:
         angle = float(examined.start.z[3 + system.joint_names.index(name)])
         wanted = (goal.joints or {}).get(name, angle)
-        if abs(wanted - angle) > _HELD:
+        if abs(wanted - angle) > slack:
             value = f'{wanted:.9g} rad of a joint that is held'
             findings.append(
                 Finding(_FILE, f'goal.joints.{name}', value, f'{angle:.9g} rad, as at the start')
             )
     moving = set(goal.joints or ()) - set(held)
-    if held and goal.object_pose is None and not goal.contacts and not moving:
+    free = goal.object_position is None and goal.object_angle is None and not goal.contacts
+    if held and free and not moving:
         value = 'only angles of joints that are held'
-        expected = 'an object pose, contacts, or a joint that moves'
+        expected = 'an object position or angle, contacts, or a joint that moves'
         findings.append(Finding(_FILE, 'goal', value, expected))
+    if examined.goal is None:
+        findings += _contradicted_contacts(constraints, system, goal.contacts or ())
     return tuple(findings)
+
+
+def _contradicted_contacts(
+    constraints: Constraints, system: ContactSystem, names: Sequence[str]
+) -> list[Finding]:
+    """Find out how the contacts of a goal in part contradict what is asked."""
+    try:
+        pairs = sorted(formation_pairs(system, 'goal.contacts', names))
+    except CfplanError:
+        return []
+    found = []
+    # A vertex on a vertex counts as two, however many elements of theirs meet.
+    least = len(set(system.pair_vertex[pairs].tolist()))
+    if constraints.max_contacts is not None and least > constraints.max_contacts:
+        expected = f'at most {constraints.max_contacts} contacts'
+        found.append(Finding(_FILE, 'goal.contacts', f'{least} contacts', expected))
+    for formation in constraints.forbidden:
+        if formation <= set(pairs):
+            forbidden = ', '.join(system.contact_names(sorted(formation)))
+            expected = f'not {forbidden}, which is forbidden'
+            found.append(Finding(_FILE, 'goal.contacts', ', '.join(names), expected))
+    return found

@@ -2,115 +2,177 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from cfplan_core.contact.elements import parse_contact
-from cfplan_core.contact.system import ContactSystem
-from cfplan_core.errors import CfplanError
+from cfplan_core.contact.system import ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Goal
-from cfplan_core.planning.manifold import formation_equations, project, tangent_basis
-from cfplan_core.planning.pieces import SAME, Piece
-from cfplan_core.planning.tracing import STEP
+from cfplan_core.planning.goal_curves import CurveGoal
+from cfplan_core.planning.goal_drives import lies_inside
+from cfplan_core.planning.goal_region import GoalRegion
+from cfplan_core.planning.pieces import Piece, Region
+from cfplan_core.planning.sheet_graph import configurations
 
-_ITERATIONS = 12
+if TYPE_CHECKING:
+    from cfplan_core.planning.regions import Regions
 
 
 class GoalTest:
-    """Looks for a goal's object pose, joints and contacts on pieces.
+    """Looks for a goal's coordinates and contacts on pieces.
 
     Attributes:
-        columns: Coordinates of z that the goal gives, shape (m,).
-        wanted: Their values, shape (m,).
+        region: The configurations that fulfil the goal.
+        nearest: Of all configurations looked at that have the goal's contacts, the one nearest to
+            its coordinates, shape (3 + n,), None if there was none.
     """
 
     def __init__(self, system: ContactSystem, goal: Goal) -> None:
-        """Compile a goal of which at least one of pose, joints and contacts is given."""
+        """Compile a goal; see `GoalRegion`.
+
+        Raises:
+            CfplanError: The goal names what the problem does not have.
+        """
         self._system = system
-        self._pairs = {system.pair(parse_contact(name)) for name in goal.contacts or ()}
-        columns: list[int] = []
-        wanted: list[float] = []
-        tolerance: list[float] = []
-        if goal.object_pose is not None:
-            x, y, phi = goal.object_pose
-            offset = complex(*system.problem.object.center_of_mass) * np.exp(1j * phi)
-            center = (complex(x, y) + offset) / system.size
-            columns += [0, 1, 2]
-            wanted += [center.real, center.imag, float(phi)]
-            tolerance += [goal.tolerance.position / system.size] * 2 + [goal.tolerance.angle]
-        names = system.joint_names
-        for name, angle in (goal.joints or {}).items():
-            if name not in names:
-                raise CfplanError(f'joint {name!r}: expected one of {", ".join(names)}')
-            columns.append(3 + names.index(name))
-            wanted.append(angle)
-            tolerance.append(goal.tolerance.joints)
-        self.columns = np.array(columns, dtype=np.intp)
-        self.wanted = np.array(wanted)
-        self._tolerance = np.array(tolerance)
-        if not columns and not self._pairs:
-            raise CfplanError('expected at least one of object pose, joints and contacts')
-        if not np.isfinite(self.wanted).all():
-            raise CfplanError(f'got {wanted}, expected finite numbers')
+        self.region = GoalRegion(system, goal)
+        self.nearest: FloatArray | None = None
+        self._least = np.inf
+
+    @property
+    def columns(self) -> IntArray:
+        """Coordinates of z that the goal gives, shape (m,)."""
+        return self.region.columns
+
+    @property
+    def wanted(self) -> FloatArray:
+        """Their values, shape (m,)."""
+        return self.region.wanted
 
     def __call__(self, piece: Piece) -> FloatArray | None:
-        """Return a configuration of a piece, shape (3 + n,), that fulfils the goal, if any.
+        """Return the configuration of a point or a curve, shape (3 + n,), nearest to the goal.
 
-        Of a region only the anchor is looked at; `Regions.reach` drives further.
+        None if no configuration fulfils it. Of a region only the anchor is looked at.
         """
         if not self.may_hold(piece):
             return None
-        if not len(self.columns):
-            return np.asarray(piece.points[len(piece.points) // 2])
-        distance = np.abs(piece.points[:, self.columns] - self.wanted).max(axis=1)
-        for nearest in _local_minima(distance):
-            if piece.dimension != 1:
-                z = piece.points[nearest]
-            elif distance[nearest] < 2.0 * STEP:
-                z = self._nearest(piece, piece.points[nearest])
-                if not _lies_on(piece, z):
-                    continue
-            else:
-                continue
+        self._note(piece.points)
+        if piece.dimension != 1 or not self.region.count:
+            z = np.asarray(piece.points[len(piece.points) // 2])
+            return z if self.fits(z) else None
+        return CurveGoal(self._system, self.region, piece).nearest()
+
+    def first(self, piece: Piece, regions: Regions, entry: FloatArray) -> FloatArray | None:
+        """Return a configuration of a piece of any dimension that fulfils the goal, if any.
+
+        Args:
+            piece: To look at.
+            regions: Know how to move in regions.
+            entry: Where the piece is entered, shape (3 + n,).
+        """
+        if not isinstance(piece, Region):
+            return self(piece)
+        return next(self._in_region(piece, regions, entry), None)
+
+    def all(self, piece: Piece, regions: Regions, entry: FloatArray) -> Iterator[FloatArray]:
+        """Configurations of a piece that the best way to the goal may end at.
+
+        On a curve the nearest to its entry of every stretch that fulfils the goal. A goal with
+        contacts is fulfilled where they are held, not just made: a little inside the piece.
+
+        Args:
+            piece: To look at.
+            regions: Know how to move in regions.
+            entry: Where the piece is entered, shape (3 + n,).
+        """
+        if not self.may_hold(piece):
+            return
+        if isinstance(piece, Region):
+            if self.fits(entry) and not self.region.pairs:
+                yield entry
+            yield from self._in_region(piece, regions, entry)
+            return
+        self._note(piece.points)
+        if piece.dimension == 0:
+            if self.fits(piece.points[0]):
+                yield np.asarray(piece.points[0])
+            return
+        curve = CurveGoal(self._system, self.region, piece)
+        begin = piece.place(entry)
+        held = not self.region.pairs or 0.0 < begin < len(piece.points) - 1.0
+        if held and self.fits(entry):
+            yield entry
+            return
+        for stretch in self._inner_stretches(curve):
+            z = curve.snapped(curve.at(np.clip([begin], *stretch))[0])
             if self.fits(z):
-                return np.asarray(z)
-        return None
+                yield z
+
+    def everywhere(self, piece: Piece, regions: Regions) -> Iterator[FloatArray]:
+        """Configurations all over where a piece fulfils the goal, in a curve's and grid's steps.
+
+        Args:
+            piece: To look at.
+            regions: Know how to move in regions.
+        """
+        if not self.may_hold(piece):
+            return
+        if isinstance(piece, Region):
+            yield from self._in_region(piece, regions, None)
+            return
+        self._note(piece.points)
+        if piece.dimension == 0:
+            yield from (z for z in piece.points if self.fits(z))
+            return
+        curve = CurveGoal(self._system, self.region, piece)
+        for low, high in self._inner_stretches(curve):
+            between = np.arange(np.floor(low) + 1.0, np.ceil(high))
+            places = np.concatenate([[low], between, [high] if high > low else []])
+            yield from (z for z in map(curve.snapped, curve.at(places)) if self.fits(z))
+
+    def _inner_stretches(self, curve: CurveGoal) -> Iterator[tuple[float, float]]:
+        """Stretches of a curve that fulfil the goal, with contacts away from the curve's ends."""
+        least, most = curve.comfortable() if self.region.pairs else (0.0, np.inf)
+        for low, high in curve.stretches():
+            inner = float(np.clip(low, least, most)), float(np.clip(high, least, most))
+            yield inner if low <= inner[0] <= inner[1] <= high else (low, high)
 
     def may_hold(self, piece: Piece) -> bool:
         """Tell whether a piece has the contacts wanted."""
-        return self._pairs <= set(piece.formation.pairs)
+        return self.has_contacts(piece.formation.pairs)
+
+    def has_contacts(self, pairs: Iterable[int]) -> bool:
+        """Tell whether contacts that touch are those wanted."""
+        return self.region.holds(pairs)
 
     def fits(self, z: FloatArray) -> bool:
         """Tell whether a configuration has the coordinates wanted, within their tolerances."""
-        return bool((np.abs(z[self.columns] - self.wanted) <= self._tolerance).all())
+        return self.region.fits(z)
 
-    def _nearest(self, piece: Piece, z: FloatArray) -> FloatArray:
-        """Gauss-Newton steps along a piece to where the wanted coordinates are nearest."""
-        pairs = piece.formation.array
-        for _ in range(_ITERATIONS):
-            rows, gradients = formation_equations(self._system, pairs, z)
-            basis = tangent_basis(gradients)
-            off = self.wanted - z[self.columns]
-            along = np.linalg.lstsq(basis[:, self.columns].T, off, rcond=1e-9)[0]
-            found = project(self._system, rows, z, basis, (z + along @ basis)[None])
-            if not found.converged[0]:
-                break
-            z = found.points[0]
-            if np.abs(along).max() < 1e-12:
-                break
-        return z
+    def how_near(self) -> str:
+        """Say, for an answer that there is no path, how near to the goal what was looked at comes.
 
+        Empty if the goal gives contacts alone.
+        """
+        if not self.region.count:
+            return ''
+        if self.nearest is None:
+            return '; no contact formation found has the contacts of the goal'
+        return f'; nearest to the goal: {self.region.describe(self.nearest)}'
 
-def _lies_on(piece: Piece, z: FloatArray) -> bool:
-    """Tell whether a configuration of a curve's manifold lies between the curve's ends."""
-    place = piece.place(z)
-    if place in (0.0, len(piece.points) - 1.0):
-        return bool(np.abs(piece.points[int(place)] - z).max() < SAME)
-    return bool(np.abs(piece.points - z).max(axis=1).min() < STEP)
+    def _in_region(
+        self, piece: Region, regions: Regions, entry: FloatArray | None
+    ) -> Iterator[FloatArray]:
+        if self.may_hold(piece):
+            self._note(configurations(piece))
+            for z in regions.reach(piece, self.region, entry):
+                if self.fits(z) and lies_inside(self._system, piece, z):
+                    yield z
 
-
-def _local_minima(values: FloatArray) -> list[int]:
-    """Indices of the smallest values among their neighbours, smallest first."""
-    padded = np.concatenate([[np.inf], values, [np.inf]])
-    smallest = (values <= padded[:-2]) & (values <= padded[2:])
-    return sorted((int(i) for i in np.flatnonzero(smallest)), key=lambda i: float(values[i]))
+    def _note(self, z: FloatArray) -> None:
+        """Remember the configuration that is nearest to the goal."""
+        ratios = self.region.ratios(z)
+        best = int(np.argmin(ratios))
+        if ratios[best] < self._least:
+            self._least, self.nearest = float(ratios[best]), z[best]

@@ -15,7 +15,7 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.geometry.separation import penetration_depth
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
 from cfplan_core.mechanics.frictionless import FrictionlessModel
-from cfplan_core.model import Grasp, Problem
+from cfplan_core.model import Goal, Grasp, Problem
 from cfplan_core.planning.equations import formation_rows, is_second_order
 from cfplan_core.planning.manifold import independent_rows, settle
 from cfplan_core.planning.tracing import classify, stability_margins
@@ -70,7 +70,8 @@ class ExaminedProblem:
 
     Attributes:
         start: The start grasp.
-        goal: The goal grasp, None if the goal gives less than a whole grasp.
+        goal: The goal grasp, None if the goal gives less than a whole grasp or, with a wide
+            tolerance, configurations around one that is none.
         findings: Of both, and of the problem itself.
     """
 
@@ -123,8 +124,14 @@ def examine_problem(
     whole = problem.goal.grasp(problem.hand)
     if whole is not None:
         goal = examine_grasp(system, model, whole, 'goal', file)
-        findings += goal.findings
-        findings += _missing_contacts(system, goal, problem.goal.contacts or (), file)
+        wrong = [*goal.findings, *_other_contacts(system, goal, problem.goal, file)]
+        if not problem.goal.tolerance.wide:
+            findings += wrong
+        elif wrong:
+            # Not this grasp is wanted, but one that is near.
+            goal = None
+    if goal is None:
+        findings += _goal_joint_limits(problem, file)
     return ExaminedProblem(start, goal, tuple(findings))
 
 
@@ -304,7 +311,7 @@ def _overlaps(problem: Problem, grasp: Grasp, field: str, file: str) -> list[Fin
                     f'at most {TOUCHING:g} m',
                 )
             )
-    for first, second in _separate_bodies(problem):
+    for first, second in separate_bodies(problem):
         depth = penetration_depth(bodies[first], bodies[second])
         if depth > TOUCHING:
             findings.append(
@@ -318,7 +325,7 @@ def _overlaps(problem: Problem, grasp: Grasp, field: str, file: str) -> list[Fin
     return findings
 
 
-def _separate_bodies(problem: Problem) -> list[tuple[str, str]]:
+def separate_bodies(problem: Problem) -> list[tuple[str, str]]:
     """Pairs of hand bodies that may not overlap: not a first link and the palm, nor neighbours."""
     palm = [f'palm.{k}' for k in range(len(problem.hand.palm))]
     chains = [
@@ -332,12 +339,31 @@ def _separate_bodies(problem: Problem) -> list[tuple[str, str]]:
     return pairs
 
 
-def _missing_contacts(
-    system: ContactSystem, examined: ExaminedGrasp, wanted: tuple[str, ...], file: str
-) -> list[Finding]:
-    """Contacts that the goal names and that do not touch in it."""
-    names = system.contact_names([int(pair) for pair in examined.pairs])
+def _goal_joint_limits(problem: Problem, file: str) -> list[Finding]:
+    """Find joints that the tolerance does not bring within their limits."""
+    goal = problem.goal
+    slack = max(_ROUNDING, goal.tolerance.joints)
     return [
+        Finding(
+            file,
+            f'goal.joints.{joint.name}',
+            f'{goal.joints[joint.name]:.9g} rad within {slack:g}',
+            f'an angle from {joint.lower:.9g} to {joint.upper:.9g} rad',
+        )
+        for joint in problem.hand.joints
+        if goal.joints is not None
+        and joint.name in goal.joints
+        and not joint.lower - slack <= goal.joints[joint.name] <= joint.upper + slack
+    ]
+
+
+def _other_contacts(
+    system: ContactSystem, examined: ExaminedGrasp, goal: Goal, file: str
+) -> list[Finding]:
+    """Contacts that the goal names and that do not touch in it, or the other way round."""
+    names = system.contact_names([int(pair) for pair in examined.pairs])
+    wanted = goal.contacts or ()
+    found = [
         Finding(
             file,
             'goal.contacts',
@@ -347,3 +373,8 @@ def _missing_contacts(
         for name in wanted
         if name not in names
     ]
+    others = [name for name in names if name not in wanted]
+    if goal.exact_contacts and others:
+        touch = f'{", ".join(others)} touching as well in the goal grasp'
+        found.append(Finding(file, 'goal.exact_contacts', touch, 'no contact but those named'))
+    return found

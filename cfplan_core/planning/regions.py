@@ -16,10 +16,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.system import BoolArray, IntArray
+from cfplan_core.contact.system import BoolArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.events import OPEN_EVENTS, EventKind
+from cfplan_core.planning.goal_drives import drives
+from cfplan_core.planning.goal_region import GoalRegion
 from cfplan_core.planning.manifold import (
     formation_equations,
     independent_rows,
@@ -59,14 +61,20 @@ class Regions:
         regions = sum(piece.dimension > 1 for piece in self._roadmap.pieces)
         if not regions:
             return (
-                'everything that can be reached with first-order stability was explored: no '
-                'region of dimension 2 or more, and curves in steps of at most '
-                f'{STEP:g} rad and object sizes'
+                f'{self._everything()} was explored: no region of dimension 2 or more, and '
+                f'curves in steps of at most {STEP:g} rad and object sizes'
             )
         return (
             'contact formations of dimension 0 and 1 were searched completely, '
             f'{regions} regions of dimension 2 and more only along rays'
         )
+
+    def _everything(self) -> str:
+        """Say which stability everything that was explored has."""
+        order = (
+            'of first or second order' if self._roadmap.model.second_order else 'of first order'
+        )
+        return f'everything that can be reached with stability {order}'
 
     def around(self, formation: Formation, z: FloatArray) -> Region:
         """Return the region of a formation that a stable configuration lies inside."""
@@ -103,32 +111,25 @@ class Regions:
                     for at, piece in found
                     if apart(at) or (piece is not region and index != region.index)
                 ]
+        self._roadmap.settling.drop(region, z)
 
-    def reach(self, region: Region, columns: IntArray, wanted: FloatArray) -> Iterator[FloatArray]:
-        """Drive some coordinates towards wanted values, shape (m,), inside a region.
+    def reach(
+        self, region: Region, goal: GoalRegion, near: FloatArray | None
+    ) -> Iterator[FloatArray]:
+        """Configurations inside a region that have a goal's coordinates.
 
-        First with all joints, then with each of the others held still: links may be in the way.
+        Args:
+            region: Of this roadmap, with the goal's contacts.
+            goal: What is looked for.
+            near: Where the region is entered, shape (3 + n,), to find what is near first; None
+                to find what there is all over it.
 
         Yields:
-            Configurations, shape (3 + n,), linked to the region's anchor, where these coordinates
-            are as near as the manifold lets them come.
+            Shape (3 + n,), linked to the region's anchor.
         """
-
-        def steer(z: FloatArray, basis: FloatArray) -> FloatArray | None:
-            off = wanted - z[columns]
-            along = np.linalg.lstsq(basis[:, columns].T, off, rcond=1e-6)[0]
-            ahead = np.asarray(along @ basis)
-            return ahead if np.abs(ahead).max() > _ARRIVED else None
-
-        tracer = self._roadmap.tracer
-        free = [k for k in range(3, self._roadmap.system.dof) if k not in columns]
-        for held in ((), *((column,) for column in free)):
-            trace = tracer.follow(region.formation, region.anchor, steer, longest=10.0, held=held)
-            if trace.kind is not EventKind.TARGET:
-                continue
-            if len(split_by_class(tracer, region.formation, trace.points)) == 1:
-                region.links.append((trace.end, trace.points))
-                yield trace.end
+        for points in drives(self._roadmap.tracer, region, goal, near):
+            region.links.append((points[-1], points))
+            yield points[-1]
 
     def _openings(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
         tracer = self._roadmap.tracer

@@ -110,7 +110,7 @@ class Robustness:
         joints = z[:, 3:]
         room = np.minimum(joints - system.lower, system.upper - joints).min(axis=1)
         return (
-            1.0 / np.maximum(self._model.needed_forces(gradients), 1e-9),
+            1.0 / np.maximum(self._force(gradients), 1e-9),
             np.maximum(self._hold(formation, z, placed, gradients), 0.0) / _COMFORTABLE_HOLD,
             self._torque(gradients, z) / _COMFORTABLE_TORQUE,
             room / _COMFORTABLE_LIMIT,
@@ -121,13 +121,23 @@ class Robustness:
         z = np.concatenate(parts)
         return near_misses(self.system, z, COMFORTABLE_CLEARANCE) / COMFORTABLE_CLEARANCE
 
+    def _force(self, gradients: FloatArray) -> FloatArray:
+        """Needed force; of two contacts, also where these only nearly balance the object."""
+        if not is_second_order(range(gradients.shape[1])):
+            return self._model.needed_forces(gradients)
+        forces, _ = pair_forces(gradients[..., :3], self.system.load)
+        return np.asarray(forces.max(axis=1))
+
     def _hold(
         self, formation: Formation, z: FloatArray, placed: Placement, gradients: FloatArray
     ) -> FloatArray:
-        """Stability margin, of two contacts where that is more; shape (s,)."""
+        """Stability margin, of two contacts where that is more; shape (s,).
+
+        That of two contacts is there also where these only nearly balance the object.
+        """
         system, model, pairs = self.system, self._model, formation.array
         hold = stability_margins(system, model, z, gradients, pairs).stable
-        if not model.second_order or is_second_order(pairs):
+        if not model.second_order:
             return hold
         for chosen in combinations(range(len(pairs)), 2):
             two = list(chosen)

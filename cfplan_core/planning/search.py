@@ -17,7 +17,7 @@ from cfplan_core.contact.formation import Formation
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.goal_test import GoalTest
-from cfplan_core.planning.pieces import Piece, Region
+from cfplan_core.planning.pieces import Piece
 from cfplan_core.planning.roadmap import Roadmap
 
 
@@ -136,7 +136,7 @@ class Search:
         # A grasp that is stable to second order is left where others lose their stability.
         roots = [tree.nodes[0].piece for tree in self._roots]
         self._settling = any(p.stability is Stability.SECOND_ORDER for p in roots)
-        self._look(self.trees[0].nodes[0].piece)
+        self._look(self.trees[0].nodes[0].piece, self.trees[0].root)
         # Among points and curves a complete tree is proof: the other can do no more.
         while self.meeting is None and all(tree.frontier for tree in self._roots):
             self._grow()
@@ -157,12 +157,12 @@ class Search:
         while self.meeting is None and any(tree.frontier for tree in self._roots):
             self._grow()
 
-    def _look(self, piece: Piece) -> bool:
+    def _look(self, piece: Piece, entry: FloatArray) -> bool:
         """Tell whether a piece of the initial tree ends the search, and remember it if so."""
         if self._test is None:
             found = piece.index in self.trees[1].index_of
         else:
-            goal = self._fulfilled(self._test, piece)
+            goal = self._fulfilled(self._test, piece, entry)
             found = goal is not None
             if goal is not None:
                 self.trees[1].root = goal
@@ -171,17 +171,13 @@ class Search:
             self.meeting = piece.index
         return found
 
-    def _fulfilled(self, test: GoalTest, piece: Piece) -> FloatArray | None:
-        """Where a piece fulfils a partial goal, shape (3 + n,)."""
+    def _fulfilled(self, test: GoalTest, piece: Piece, entry: FloatArray) -> FloatArray | None:
+        """Where a piece fulfils a partial goal, shape (3 + n,): the start, if it does."""
         if piece is self.trees[0].nodes[0].piece and test.may_hold(piece):
             start = self.trees[0].root
             if test.fits(start):
                 return start
-        goal = test(piece)
-        if goal is not None or not isinstance(piece, Region) or not test.may_hold(piece):
-            return goal
-        reached = self.roadmap.regions.reach(piece, test.columns, test.wanted)
-        return next((z for z in reached if test.fits(z)), None)
+        return test.first(piece, self.roadmap.regions, entry)
 
     def _neighbours(self, piece: Piece) -> Iterator[tuple[FloatArray, Piece]]:
         yield from self.roadmap.neighbours(piece)
@@ -205,7 +201,7 @@ class Search:
                 self._grown(*(len(t.nodes) + (t is tree) for t in self.trees))
                 level.append(tree.add(Node(piece, index, entry, node.depth + 1)))
                 if self._test is not None:
-                    if self._look(piece):
+                    if self._look(piece, entry):
                         return
                 elif piece.index in other.index_of:
                     depth = node.depth + 1 + other.nodes[other.index_of[piece.index]].depth

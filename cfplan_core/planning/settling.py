@@ -24,7 +24,7 @@ from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.mechanics.second_order import imbalance, pair_forces
 from cfplan_core.planning.equations import EQUILIBRIUM, equations
 from cfplan_core.planning.manifold import formation_equations, tangent_basis
-from cfplan_core.planning.pieces import Piece, Region
+from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.tracing import STABILITY_MARGIN
 from cfplan_core.planning.transitions import Departure, Surroundings
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # Forces of others than two contacts, in weights, that count as none where stability ends.
 _HARDLY = 1e-4
 # How far, in radians and object sizes, they may vanish behind that.
-_BEHIND = 1e-3
+BEHIND = 1e-3
 _BALANCED = 1e-8
 # Rates of gaps and forces along a motion below this are none.
 _RATE = 1e-7
@@ -59,11 +59,21 @@ class Settling:
         if piece.index not in self._beside:
             self._beside[piece.index] = []
             for z in self._places(piece):
-                for found in self._behind(z):
-                    if found is not piece:
-                        self._beside[piece.index].append((z, found))
-                        self._back.setdefault(found.index, []).append((z, piece))
+                for found in self._behind(piece, z):
+                    self._beside[piece.index].append((z, found))
+                    self._back.setdefault(found.index, []).append((z, piece))
         return [*self._beside[piece.index], *self._back.get(piece.index, ())]
+
+    def drop(self, region: Region, z: FloatArray) -> None:
+        """Forget that a region is entered or left at a configuration, shape (3 + n,)."""
+        for table in (self._beside, self._back):
+            for index, found in table.items():
+                table[index] = [
+                    (at, piece)
+                    for at, piece in found
+                    if np.abs(at - z).max() > SAME
+                    or (piece is not region and index != region.index)
+                ]
 
     def _places(self, piece: Piece) -> Iterator[FloatArray]:
         """Configurations at the end of a piece where two contacts may balance the object."""
@@ -71,12 +81,16 @@ class Settling:
             yield from self._on_border(piece)
         if piece.dimension != 1:
             return
-        for end, z in zip(piece.ends, (piece.points[0], piece.points[-1]), strict=True):
+        for end, place in zip(piece.ends, (0, -1), strict=True):
             if end is not None:
                 yield end.z
             elif piece.stability is not Stability.SECOND_ORDER:
-                located = self.locate(piece.formation, z)
+                located = self.locate(piece.formation, piece.points[place])
                 if located is not None:
+                    # The curve ends there, not by a hair before.
+                    points = piece.points.copy()
+                    points[place] = located
+                    piece.points = points
                     yield located
 
     def _on_border(self, region: Region) -> Iterator[FloatArray]:
@@ -115,7 +129,7 @@ class Settling:
             forces, rest = pair_forces(wrenches[None, pair], tracer.system.load)
             if rest[0] < _HARDLY * (1.0 + forces.max()) and forces.min() > STABILITY_MARGIN:
                 found = self._vanishing(formation, formation.array[list(pair)], z)
-                if found is not None and np.abs(found - z).max() < _BEHIND:
+                if found is not None and np.abs(found - z).max() < BEHIND:
                     return found
         return None
 
@@ -140,7 +154,7 @@ class Settling:
     def ways(self, z: FloatArray) -> list[Departure]:
         """Formations that lead out of a configuration where two contacts balance the object."""
         around = self._roadmap.junction(z).around
-        if around is None or around.held_vertex or len(around.pairs) < 3:
+        if around is None or len(around.pairs) < 3:
             return []
         found: list[Departure] = []
         for pair in combinations(range(len(around.pairs)), 2):
@@ -181,14 +195,23 @@ class Settling:
         self, around: Surroundings, kept: list[int], rising: list[FloatArray]
     ) -> Departure | None:
         """Way into a formation along which gaps open and given slopes rise, if there is one."""
+        if around.together[np.ix_(kept, kept)].any():
+            return None
         formation = Formation(tuple(int(pair) for pair in around.pairs[kept]))
         _, gradients = formation_equations(self._roadmap.system, formation.array, around.z)
         basis = tangent_basis(gradients)
         if not len(basis):
             return None
-        left = [k for k in range(len(around.pairs)) if k not in kept]
+        # Where a vertex lies on a vertex the contact that is kept decides how others part.
+        beside = np.asarray(around.together[:, kept].any(axis=1))
+        left = [k for k in range(len(around.pairs)) if k not in kept and not beside[k]]
+        rates = np.abs(around.gradients @ basis.T).max(axis=1)
+        opening = [k for k in left if rates[k] >= _RATE]
+        # What stays in touch must leave the end of its edge, what is kept must not.
+        passing = [k for k in left if rates[k] < _RATE]
         sliding = [k for k in kept if around.at_end[k]]
-        wanted = np.array([*rising, *around.gradients[left], *around.inward[sliding]]) @ basis.T
+        rising = [*rising, *around.gradients[opening], *around.inward[sliding]]
+        wanted = np.array([*rising, *-around.inward[passing]]) @ basis.T
         if not len(wanted):
             return None
         along = np.linalg.lstsq(wanted, np.ones(len(wanted)), rcond=None)[0]
@@ -198,18 +221,20 @@ class Settling:
         return Departure(
             formation,
             heading / np.linalg.norm(heading),
-            frozenset(int(pair) for pair in around.pairs[left]),
+            frozenset(int(pair) for pair in around.pairs[opening]),
         )
 
-    def _behind(self, z: FloatArray) -> Iterator[Piece]:
-        """Pieces that ways out of a configuration lead to."""
+    def _behind(self, piece: Piece, z: FloatArray) -> Iterator[Piece]:
+        """Pieces that ways out of the end of another lead to."""
         roadmap = self._roadmap
         for way in self.ways(z):
+            if way.formation == piece.formation:
+                continue
             roadmap.attempts += 1
             rows, _ = formation_equations(roadmap.system, way.formation.array, z)
             if roadmap.system.dof - len(rows) > 1:
-                piece: Piece | None = roadmap.regions.enter(z, way)
+                found: Piece | None = roadmap.regions.enter(z, way)
             else:
-                piece = roadmap.curve_along(z, way)
-            if piece is not None:
-                yield piece
+                found = roadmap.curve_along(z, way)
+            if found is not None:
+                yield found

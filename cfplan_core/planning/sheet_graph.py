@@ -15,7 +15,7 @@ import numpy as np
 
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.joint_grid import Place
-from cfplan_core.planning.pieces import SAME, Region
+from cfplan_core.planning.pieces import SAME, Piece, Region
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,3 +132,8 @@ class Sheet(Region):
                 ahead = at + (ahead - at) // 2
             at = ahead
         return np.concatenate(parts)
+
+
+def configurations(piece: Piece) -> FloatArray:
+    """Configurations of a piece that were looked at, shape (s, 3 + n)."""
+    return np.array(piece.vertices) if isinstance(piece, Sheet) else piece.points

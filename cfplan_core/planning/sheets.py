@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.system import BoolArray, IntArray
+from cfplan_core.contact.system import BoolArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.options import RESOLUTION
 from cfplan_core.planning.equations import equation_gradients, formation_rows, is_second_order
 from cfplan_core.planning.events import EventKind
+from cfplan_core.planning.goal_region import GoalRegion
 from cfplan_core.planning.joint_grid import JointGrid, Place
 from cfplan_core.planning.manifold import formation_equations, independent_rows, project
 from cfplan_core.planning.pieces import SAME, Piece, Region
@@ -27,10 +28,10 @@ from cfplan_core.planning.regions import Regions, _heading
 from cfplan_core.planning.settling_steps import settling_steps
 from cfplan_core.planning.sheet_crossing import step_across
 from cfplan_core.planning.sheet_filling import Table, fill
+from cfplan_core.planning.sheet_goals import goals_on_sheet
 from cfplan_core.planning.sheet_graph import Border, Sheet
 from cfplan_core.planning.sheet_steps import take_steps
 from cfplan_core.planning.sheet_walks import towards, walk
-from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STEP, classify
 from cfplan_core.planning.transitions import Departure
 
@@ -66,49 +67,28 @@ class Sheets(Regions):
         """Say how completely regions were explored."""
         vertices = sum(len(sheet.vertices) for sheet in self.sheets)
         return (
-            'everything that can be reached with first-order stability was explored: curves in '
-            f'steps of at most {STEP:g} rad and object sizes, {len(self.sheets)} regions of '
-            f'dimension 2 at {vertices} configurations over a grid of joint angles of '
-            f'{self.grid.spacing:g} rad, or finer in small regions, down to '
-            f'{self.grid.finest:g} rad'
+            f'{self._everything()} was explored: curves in steps of at most {STEP:g} rad and '
+            f'object sizes, {len(self.sheets)} regions of dimension 2 at {vertices} '
+            f'configurations over a grid of joint angles of {self.grid.spacing:g} rad, or finer '
+            f'in small regions, down to {self.grid.finest:g} rad'
         )
 
     def around(self, formation: Formation, z: FloatArray) -> Region:
         """Return the sheet of a formation that a stable configuration lies on."""
         return self._join(formation, z, z[None])
 
-    def reach(self, region: Region, columns: IntArray, wanted: FloatArray) -> Iterator[FloatArray]:
-        """Drive some coordinates towards wanted values, shape (m,), on a sheet.
-
-        From every vertex that is nearer than those beside it.
-
-        Yields:
-            Configurations, shape (3 + n,), linked to the sheet, where these coordinates are as
-            near as the sheet lets them come.
-        """
+    def reach(
+        self, region: Region, goal: GoalRegion, near: FloatArray | None
+    ) -> Iterator[FloatArray]:
+        """Configurations on a sheet that have a goal's coordinates; see `Regions.reach`."""
         assert isinstance(region, Sheet)
-        tracer = self._roadmap.tracer
-
-        def steer(z: FloatArray, basis: FloatArray) -> FloatArray | None:
-            off = wanted - z[columns]
-            along = np.linalg.lstsq(basis[:, columns].T, off, rcond=1e-6)[0]
-            ahead = np.asarray(along @ basis)
-            return ahead if np.abs(ahead).max() > 1e-9 else None
-
-        off = np.abs(np.array(region.vertices)[:, columns] - wanted).max(axis=1)
-        nearest = [
-            vertex
-            for vertex in np.argsort(off, kind='stable')
-            if all(off[vertex] <= off[other] for other in region.edges[vertex])
-        ]
-        for vertex in nearest:
-            z = region.vertices[vertex]
-            trace = tracer.follow(region.formation, z, steer, longest=1.0)
-            if trace.kind is not EventKind.TARGET:
-                continue
-            if len(split_by_class(tracer, region.formation, trace.points)) == 1:
-                region.links.append((trace.end, trace.points))
-                yield trace.end
+        if region.places == [None]:
+            yield from super().reach(region, goal, near)
+            return
+        rows = self._table(region.formation, region.vertices[0]).rows
+        for points in goals_on_sheet(self._roadmap.tracer, region, rows, goal, near):
+            region.links.append((points[-1], points))
+            yield points[-1]
 
     def losses(self, region: Region) -> Iterator[FloatArray]:
         """Ways from a sheet's vertices to where two contacts come to hold the object alone.

@@ -8,6 +8,7 @@ from enum import Enum
 
 import numpy as np
 
+from cfplan_core.errors import Finding
 from cfplan_core.geometry.polygon import FloatArray
 
 
@@ -106,6 +107,7 @@ class PlanResult:
         margin: Worst robustness margin of the plan, where it was chosen among several, else None.
         margin_bound: No plan has a larger margin, at the resolution stated; None if not asked.
         alternatives: Other plans, the next best first, each without further ones.
+        findings: Everything that is wrong, if invalid. Not in plan files.
     """
 
     problem: str
@@ -126,6 +128,7 @@ class PlanResult:
     margin: float | None = None
     margin_bound: float | None = None
     alternatives: tuple[PlanResult, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     @property
     def solved(self) -> bool:

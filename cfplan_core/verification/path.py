@@ -11,7 +11,7 @@ from cfplan_core.verification.checks import TOUCH
 from cfplan_core.verification.mechanism import Mechanism, Scene
 from cfplan_core.verification.report import Recorder
 from cfplan_core.verification.structure import Stretch
-from cfplan_core.verification.touching import locate, parse_pair
+from cfplan_core.verification.touching import locate, parse_pair, touching_pairs
 
 PROJECTION = 10.0
 """How much farther than the largest gap a start may be moved to close it."""
@@ -104,22 +104,23 @@ def check_goal(mechanism: Mechanism, result: PlanResult, scene: Scene, record: R
     """
     goal = mechanism.problem.goal
     last = len(result.times) - 1
-    if goal.object_pose is not None:
-        shift = result.object_poses[-1] - goal.object_pose
+    if goal.object_position is not None:
+        apart = math.dist(result.object_poses[-1, :2], goal.object_position)
         record.measure(
             'goal_position',
-            math.hypot(*shift[:2]) / goal.tolerance.position,
+            apart / goal.tolerance.position,
             last,
-            f'object position off the goal by {math.hypot(*shift[:2]):.6g} m, divided by the '
-            'tolerance,',
+            f'object position off the goal by {apart:.6g} m, divided by the tolerance,',
         )
-        turns = round(float(shift[2]) / math.tau)
+    if goal.object_angle is not None:
+        turn = float(result.object_poses[-1, 2]) - goal.object_angle
+        turns = round(turn / math.tau)
         hint = f' ({turns} whole turns and a rest)' if turns else ''
         record.measure(
             'goal_angle',
-            abs(float(shift[2])) / goal.tolerance.angle,
+            abs(turn) / goal.tolerance.angle,
             last,
-            f'object angle off the goal by {shift[2]:.6g} rad{hint}, divided by the tolerance,',
+            f'object angle off the goal by {turn:.6g} rad{hint}, divided by the tolerance,',
         )
     columns = {name: k for k, name in enumerate(result.joint_names)}
     for name, angle in (goal.joints or {}).items():
@@ -141,3 +142,11 @@ def check_goal(mechanism: Mechanism, result: PlanResult, scene: Scene, record: R
             continue
         distance = locate(pair, scene).distance
         record.measure('goal_contacts', distance, last, f'gap of {name}')
+    if goal.exact_contacts:
+        others = sorted(set(touching_pairs(mechanism, scene)) - set(goal.contacts or ()))
+        record.require(
+            'goal_contacts',
+            not others,
+            last,
+            f'{", ".join(others)} at the goal, expected nothing but the contacts that it names',
+        )

@@ -28,7 +28,7 @@ from cfplan_core.verification.mechanism import Mechanism, Scene, mechanism_of
 from cfplan_core.verification.overlap import overlap_depth
 from cfplan_core.verification.path import check_goal, check_limits, check_start, check_steps
 from cfplan_core.verification.report import Recorder, VerificationReport
-from cfplan_core.verification.structure import CLASSES, Stretch, check_structure
+from cfplan_core.verification.structure import Stretch, check_structure
 from cfplan_core.verification.touching import Pair, Touch, touching_pairs
 
 Scenes = tuple[Scene, ...]
@@ -110,7 +110,8 @@ def _check_frame(
         together = dict.fromkeys(pair for hold in holds for pair in hold.contacts)
         if len(holds) == 1:
             together |= {pair: None for pair, _ in events[frame].values()}
-        weakest = max((hold.stability for hold in holds), key=CLASSES.index)
+        # An instant may be held to second order only, where contacts let go and others take over.
+        weakest = 'second_order' if len(holds) > 1 else only.stability
         owner = ' and '.join(hold.owner for hold in holds)
         check_stable(Hold(mechanism, frame, scene, tuple(together), owner, weakest), record)
     check_torques(holds, claimed, inside, record)

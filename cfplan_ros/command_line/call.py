@@ -10,6 +10,7 @@ import click
 
 from cfplan_core.command_line.console import INVALID_INPUT, answers, complain
 from cfplan_core.command_line.plan import EXIT_STATUS, finite_seconds, print_result, write_result
+from cfplan_core.command_line.plan_options import wanted_plan
 from cfplan_core.command_line.progress import progress_bar
 from cfplan_core.errors import CfplanError
 from cfplan_core.trajectory.plan_result import PlanResult, Status
@@ -37,7 +38,8 @@ _POLL_PERIOD = 0.2
     'json_path',
     type=click.Path(dir_okay=False, path_type=Path),
     metavar='OUT',
-    help='Write the result here as JSON, whatever the outcome; missing directories are created.',
+    help='Write the result here as JSON, whatever the outcome; missing directories are created. '
+    'Alternatives go beside it, as OUT with .2, .3 and so on before its suffix.',
 )
 @click.option(
     '--figures',
@@ -71,6 +73,7 @@ _POLL_PERIOD = 0.2
     metavar='S',
     help='How long to wait for the planner to be there.',
 )
+@wanted_plan
 def call(
     file: Path,
     node_name: str,
@@ -80,6 +83,7 @@ def call(
     max_nodes: int | None,
     plan_only: bool,
     wait: float,
+    **wanted: Any,
 ) -> int:
     """Send the problem FILE to a running planner and print its answer as `cfplan plan` does.
 
@@ -91,6 +95,7 @@ def call(
     exhausted, 4 the planner is not there or could not plan, 130 interrupted.
     """
     from cfplan_core.model.loading import load_problem
+    from cfplan_core.options import PlanOptions
 
     problem = load_problem(file)
     for directory in (json_path.parent if json_path else None, figure_directory):
@@ -100,13 +105,8 @@ def call(
     with needs_rclpy():
         from cfplan_ros.conversions.plans import plan_result
         from cfplan_ros.conversions.requests import request_from_problem
-    request = request_from_problem(problem)
-    if time_budget is not None:
-        from cfplan_ros.conversions.times import duration_message
-
-        request.options.time_budget = duration_message(time_budget)
-    request.options.max_nodes = max_nodes or 0
-    request.options.plan_only = plan_only
+    options = PlanOptions(time_budget=time_budget, max_nodes=max_nodes, **wanted)
+    request = request_from_problem(problem, options, plan_only=plan_only)
     response = _answer_to(request, node_name, wait)
     if response is None:
         return NOT_ANSWERED

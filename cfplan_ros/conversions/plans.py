@@ -87,6 +87,7 @@ def plan_message(result: PlanResult, frame_id: str, stamp: Time) -> Manipulation
         problem_name=result.problem,
         joint_trajectory=JointTrajectory(header=Header(stamp=stamp)),
         torque_limits=JointTorqueLimits(header=Header(stamp=stamp)),
+        margin=array('d', [] if result.margin is None else [result.margin]),
         initial_tree=tree_message(result.trees[0]),
         goal_tree=tree_message(result.trees[1]),
         explored_formations=int(statistics.formations),
@@ -143,9 +144,11 @@ def response_of(
     """
     return _Response(
         error_code=_code(result),
-        error_msg=result.message,
+        error_msg='' if result.solved else result.message,
         planning_time=duration_message(result.statistics.planning_time),
         plan=plan_message(result, frame_id, stamp),
+        alternatives=[plan_message(other, frame_id, stamp) for other in result.alternatives],
+        optimality=result.message if result.solved else '',
         record=record,
     )
 
@@ -188,25 +191,41 @@ def plan_result(response: PlanManipulation.Response) -> PlanResult | None:
     status = _STATUSES.get(response.error_code)
     if status is None:
         return None
+    solved = status is Status.SOLVED
+    message = response.optimality if solved else response.error_msg
+    result = _outcome(plan, status, message, seconds_of(response.planning_time), 'plan')
+    if not solved:
+        return result
+    others = (
+        _outcome(other, status, message, seconds_of(response.planning_time), f'alternatives[{k}]')
+        for k, other in enumerate(response.alternatives)
+    )
+    return replace(result, alternatives=tuple(others))
+
+
+def _outcome(
+    plan: ManipulationPlan, status: Status, message: str, planning_time: float, field: str
+) -> PlanResult:
     trees = (
-        tree_nodes(plan.initial_tree, 'plan.initial_tree'),
-        tree_nodes(plan.goal_tree, 'plan.goal_tree'),
+        tree_nodes(plan.initial_tree, f'{field}.initial_tree'),
+        tree_nodes(plan.goal_tree, f'{field}.goal_tree'),
     )
     result = PlanResult(
         problem=plan.problem_name,
         status=status,
         joint_names=tuple(plan.joint_trajectory.joint_names),
-        message=response.error_msg,
+        message=message,
         statistics=Statistics(
-            planning_time=seconds_of(response.planning_time),
+            planning_time=planning_time,
             initial_tree_nodes=len(trees[0]),
             goal_tree_nodes=len(trees[1]),
             formations=int(plan.explored_formations),
             transitions=int(plan.tried_transitions),
         ),
         trees=trees,
+        margin=float(plan.margin[0]) if len(plan.margin) else None,
     )
-    return _with_frames(result, plan) if result.solved else result
+    return _with_frames(result, plan, field) if result.solved else result
 
 
 def _code(result: PlanResult) -> int:
@@ -219,10 +238,10 @@ def _code(result: PlanResult) -> int:
     return _CODES[result.status]
 
 
-def _with_frames(result: PlanResult, plan: ManipulationPlan) -> PlanResult:
+def _with_frames(result: PlanResult, plan: ManipulationPlan, owner: str) -> PlanResult:
     points, limits = plan.joint_trajectory.points, plan.torque_limits.points
     width = len(result.joint_names)
-    _refuse_misfits(plan)
+    _refuse_misfits(plan, owner)
     poses = [
         (pose.position.x, pose.position.y, angle)
         for pose, angle in zip(plan.object_poses, plan.object_angles, strict=True)
@@ -247,12 +266,12 @@ def _with_frames(result: PlanResult, plan: ManipulationPlan) -> PlanResult:
     )
 
 
-def _refuse_misfits(plan: ManipulationPlan) -> None:
+def _refuse_misfits(plan: ManipulationPlan, owner: str) -> None:
     """Refuse a plan whose parts have different lengths, times or joints."""
     trajectory, limits = plan.joint_trajectory, plan.torque_limits
     count, width = len(trajectory.points), len(trajectory.joint_names)
     found = [
-        Finding('response', f'plan.{field}', f'{got} entries', f'{wanted}, one per {what}')
+        Finding('response', f'{owner}.{field}', f'{got} entries', f'{wanted}, one per {what}')
         for field, got, wanted, what in (
             ('torque_limits.points', len(limits.points), count, 'point of the trajectory'),
             ('object_poses', len(plan.object_poses), count, 'point of the trajectory'),
@@ -272,7 +291,7 @@ def _refuse_misfits(plan: ManipulationPlan) -> None:
     found += [
         Finding(
             'response',
-            f'plan.segments[{k}]',
+            f'{owner}.segments[{k}]',
             f'stability {segment.stability}, points {segment.first_point} to {segment.last_point}',
             f'a stability of PlanSegment, points 0 to {count - 1}',
         )
@@ -284,7 +303,7 @@ def _refuse_misfits(plan: ManipulationPlan) -> None:
         found.append(
             Finding(
                 'response',
-                'plan.torque_limits.joint_names',
+                f'{owner}.torque_limits.joint_names',
                 repr(list(limits.joint_names)),
                 f'{list(trajectory.joint_names)!r}, as of the trajectory',
             )

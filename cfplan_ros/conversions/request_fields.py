@@ -90,6 +90,11 @@ def as_sent(finding: Finding, origin: Origin) -> Finding:
         return replace(finding, field=f'{top}.contact_formation.{rest}')
     if rest.startswith('object_pose'):
         return replace(finding, field=f'{top}.{_pose(rest, top in origin.angles)}')
+    if rest.startswith('position'):
+        axes = _axes(rest.removeprefix('position'))
+        return replace(finding, field=f'{top}.object_position[0]{axes}')
+    if rest == 'orientation':
+        return replace(finding, field=f'{top}.object_angle[0]')
     if rest.startswith('joints.'):
         return _joint(finding, top, rest.removeprefix('joints.'), origin.joint_names[top])
     return finding

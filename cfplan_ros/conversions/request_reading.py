@@ -123,6 +123,8 @@ class RequestReader:
             'start.object_angle': request.start.object_angle,
             'goal.object_pose': request.goal.object_pose,
             'goal.object_angle': request.goal.object_angle,
+            'start.object_position': request.start.object_position,
+            'goal.object_position': request.goal.object_position,
             'object': request.object,
             'gravity': request.gravity,
         }
@@ -158,7 +160,7 @@ class RequestReader:
                 part,
             )
         if not len(grasp.object_pose):
-            if len(grasp.object_angle):
+            if len(grasp.object_angle) and field == 'start':
                 self._wrong(
                     f'{field}.object_angle',
                     _Said('an angle without a pose'),
@@ -252,6 +254,12 @@ class RequestReader:
             )
         if not len(start.object_pose) and not len(start.object_angle):
             self._wrong('start.object_pose', _Said('nothing'), 'a pose', 'start.object_pose')
+        if len(start.object_position):
+            self._wrong(
+                'start.object_position', _Said('a position'), 'none: object_pose says where it is'
+            )
+        if start.exact_contacts:
+            self._wrong('start.exact_contacts', True, 'false: a start names no contacts')
         count = len(start.contact_formation.contacts)
         if count:
             self._wrong(
@@ -279,15 +287,33 @@ class RequestReader:
                             'a vertex or an edge: vK or eK',
                             f'goal.contacts[{k}]',
                         )
+        self._parts_of_pose(goal, values)
+        if goal.exact_contacts:
+            values['exact_contacts'] = True
         self._without_goal = not values
         state = goal.joints
-        given = (goal.object_pose, goal.object_angle, state.name, state.position, contacts)
-        if not any(len(part) for part in given):
+        poses = (goal.object_pose, goal.object_angle, goal.object_position)
+        if not any(len(part) for part in (*poses, state.name, state.position, contacts)):
             self._wrong(
                 'goal',
                 _Said('nothing'),
-                'at least one of object_pose, joints and contact_formation.contacts',
+                'at least one of object_pose, object_position, object_angle, joints and '
+                'contact_formation.contacts',
             )
+
+    def _parts_of_pose(self, goal: Grasp, values: dict[str, Any]) -> None:
+        """Read an angle without a pose, and a position."""
+        if len(goal.object_angle) and not len(goal.object_pose):
+            angle = float(goal.object_angle[0])
+            if math.isfinite(angle):
+                values['orientation'] = angle
+            else:
+                self._wrong('goal.object_angle[0]', angle, 'a finite number of rad')
+        if len(goal.object_position):
+            field = 'goal.object_position[0]'
+            position = self._planar(field, goal.object_position[0], 'm', 'goal.position')
+            if position is not None:
+                values['position'] = position
 
     def _tolerance(self, request: PlanManipulation.Request) -> dict[str, float]:
         options = request.options

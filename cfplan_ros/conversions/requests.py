@@ -6,20 +6,24 @@ from dataclasses import replace
 from typing import Any
 
 from cfplan_msgs.msg import Grasp, ObjectDescription
-from cfplan_msgs.msg import PlanOptions as OptionsMessage
 from cfplan_msgs.srv import PlanManipulation
 from geometry_msgs.msg import Point, Vector3
 from sensor_msgs.msg import JointState
 
-from cfplan_core.errors import CfplanError, Finding
+from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.model import Problem
+from cfplan_core.model import Goal, Problem
 from cfplan_core.model.loading import problem_from_mapping
 from cfplan_core.planner import PlanOptions
 from cfplan_core.planning.grasp_check import check_problem
 from cfplan_core.trajectory.plan_result import PlanResult
 from cfplan_ros.conversions.contacts import formation_message
 from cfplan_ros.conversions.hands import hand_digest
+from cfplan_ros.conversions.options import (
+    constraint_message,
+    constraint_values,
+    option_findings,
+)
 from cfplan_ros.conversions.poses import pose_message
 from cfplan_ros.conversions.request_fields import InvalidRequestError as InvalidRequestError
 from cfplan_ros.conversions.request_fields import as_sent
@@ -56,7 +60,8 @@ def problem_from_request(
         raise InvalidRequestError(reader.findings[:1])
     reading = problem_from_mapping(reader.mapping)
     found = [finding for finding in reading.findings if not reader.reported(finding.field)]
-    findings = [*reader.findings, *(as_sent(finding, reader.origin) for finding in found)]
+    findings = [*reader.findings, *option_findings(request.options, setup)]
+    findings += [as_sent(finding, reader.origin) for finding in found]
     problem = reading.problem
     if findings:
         known = {finding.field for finding in reading.findings}
@@ -70,7 +75,9 @@ def problem_from_request(
     assert problem is not None
     options = request.options
     return replace(problem, name=request.problem_name), PlanOptions(
-        time_budget=time_budget(request, setup)[0], max_nodes=options.max_nodes or None
+        time_budget=time_budget(request, setup)[0],
+        max_nodes=options.max_nodes or None,
+        **constraint_values(options, setup),
     )
 
 
@@ -99,7 +106,7 @@ def time_budget(request: PlanManipulation.Request, setup: Setup) -> tuple[float 
 def invalid_grasps(
     result: PlanResult, problem: Problem, request: PlanManipulation.Request, setup: Setup
 ) -> InvalidRequestError:
-    """Say in the request's words why the planner took its start or its goal for invalid.
+    """Say in the request's words why the planner took its start, goal or options for invalid.
 
     Args:
         result: With the status invalid.
@@ -108,9 +115,7 @@ def invalid_grasps(
         setup: What the planner brings.
     """
     origin = RequestReader(request, setup).origin
-    findings = check_problem(problem) or [
-        Finding('', 'goal', result.message.removeprefix('goal: '), '')
-    ]
+    findings = result.findings or check_problem(problem)
     return InvalidRequestError(as_sent(finding, origin) for finding in findings)
 
 
@@ -138,8 +143,16 @@ def request_from_problem(
             f'contact.friction: got {problem.friction:g}, expected 0: a request cannot say it'
         )
     options = options or PlanOptions()
-    tolerance = problem.goal.tolerance
-    goal = problem.goal
+    goal, tolerance = problem.goal, problem.goal.tolerance
+    limits = constraint_message(options)
+    # Zero would be the planner's own budget.
+    budget = 0.0 if options.time_budget is None else max(options.time_budget, 1e-9)
+    limits.time_budget = duration_message(budget)
+    limits.max_nodes = options.max_nodes or 0
+    limits.position_tolerance = float(tolerance.position)
+    limits.angle_tolerance = float(tolerance.angle)
+    limits.joint_tolerance = float(tolerance.joints)
+    limits.plan_only = plan_only
     return PlanManipulation.Request(
         problem_name=problem.name,
         hand_digest=hand_digest(problem.hand),
@@ -149,7 +162,7 @@ def request_from_problem(
             (),
             frame_id,
         ),
-        goal=_grasp(dict(goal.joints or {}), goal.object_pose, goal.contacts or (), frame_id),
+        goal=_goal(goal, frame_id),
         object=[
             ObjectDescription(
                 vertices=[_point(vertex) for vertex in problem.object.vertices],
@@ -158,17 +171,7 @@ def request_from_problem(
             )
         ],
         gravity=[Vector3(x=float(problem.gravity[0]), y=float(problem.gravity[1]), z=0.0)],
-        options=OptionsMessage(
-            # Zero would be the planner's own budget.
-            time_budget=duration_message(
-                0.0 if options.time_budget is None else max(options.time_budget, 1e-9)
-            ),
-            max_nodes=options.max_nodes or 0,
-            position_tolerance=float(tolerance.position),
-            angle_tolerance=float(tolerance.angle),
-            joint_tolerance=float(tolerance.joints),
-            plan_only=plan_only,
-        ),
+        options=limits,
     )
 
 
@@ -185,6 +188,16 @@ def _grasp(
         object_angle=[float(object_pose[2])] if object_pose is not None else [],
         contact_formation=formation_message(contacts),
     )
+
+
+def _goal(goal: Goal, frame_id: str) -> Grasp:
+    message = _grasp(dict(goal.joints or {}), goal.object_pose, goal.contacts or (), frame_id)
+    if goal.position is not None:
+        message.object_position = [_point(goal.position)]
+    if goal.orientation is not None:
+        message.object_angle = [float(goal.orientation)]
+    message.exact_contacts = goal.exact_contacts
+    return message
 
 
 def _point(point: FloatArray) -> Point:

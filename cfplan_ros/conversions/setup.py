@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from cfplan_core.model import Hand
+from cfplan_core.options import RESOLUTION
 from cfplan_ros.conversions.hands import build_hand, hand_digest
 
 
@@ -22,6 +23,9 @@ class Setup:
         frame_id: The hand's planar frame.
         default_time_budget: Seconds for a request that names none, or None for no limit.
         maximal_time_budget: Most seconds that any request gets, or None for no limit.
+        default_preference: Which plan to choose for a request that does not say, see
+            `PlanOptions.prefer`.
+        default_resolution: Spacing of the grid of joint angles, rad, likewise.
         friction: Coulomb coefficient of every contact.
     """
 
@@ -31,6 +35,8 @@ class Setup:
     frame_id: str = 'palm'
     default_time_budget: float | None = None
     maximal_time_budget: float | None = None
+    default_preference: str = 'first'
+    default_resolution: float = RESOLUTION
     friction: float = 0.0
 
     @cached_property

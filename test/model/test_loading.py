@@ -146,6 +146,26 @@ def test_values_arrive_where_they_belong():
     assert (problem.goal.tolerance.position, problem.goal.tolerance.angle) == (1e-4, 0.5)
 
 
+def test_parts_of_a_goal_arrive_where_they_belong():
+    goal = {
+        'position': [0.1, 0.2],
+        'orientation': 7,
+        'contacts': ['object.v0|palm.0.e2'],
+        'exact_contacts': True,
+    }
+    read = problem_from_mapping(changed((('goal',), goal))).problem.goal
+    assert read.object_pose is None
+    assert read.position.tolist() == [0.1, 0.2]
+    assert (read.orientation, read.exact_contacts) == (7.0, True)
+    assert (read.object_position.tolist(), read.object_angle) == ([0.1, 0.2], 7.0)
+
+
+def test_shipped_goals_in_part_have_no_findings():
+    paths = sorted(PROBLEMS[0].parent.glob('goals/*.yaml'))
+    assert paths
+    assert [read_problem(path).findings for path in paths] == [()] * len(paths)
+
+
 def test_joints_are_ordered_as_in_the_hand_whatever_their_order_in_the_file():
     joints = dict(reversed(SOUND['start']['joints'].items()))
     problem = problem_from_mapping(changed((('start', 'joints'), joints))).problem
@@ -386,10 +406,46 @@ def test_unknown_joint_is_found_with_the_nearest_one(grasp):
     assert "'right_1'" in finding.expected
 
 
+@pytest.mark.parametrize(
+    ('goal', 'field', 'value'),
+    [
+        ({'object_pose': [0, 0, 0], 'orientation': 0}, 'goal.orientation', '0 beside object_pose'),
+        (
+            {'object_pose': [0, 0, 0], 'position': [0, 0]},
+            'goal.position',
+            '[0, 0] beside object_pose',
+        ),
+        (
+            {'orientation': 0, 'exact_contacts': True},
+            'goal.exact_contacts',
+            'true without contacts',
+        ),
+        ({'orientation': '0'}, 'goal.orientation', "the text '0'"),
+        ({'position': [0, 0, 0]}, 'goal.position', '3: [0, 0, 0]'),
+        (
+            {'contacts': ['object.v0|palm.0.e2'], 'exact_contacts': 1},
+            'goal.exact_contacts',
+            '1',
+        ),
+    ],
+)
+def test_goal_that_says_something_twice_or_wrongly_is_found(goal, field, value):
+    finding = only_finding((('goal',), goal))
+    assert finding.field == field
+    assert finding.value.startswith(value)
+
+
+def test_joint_goal_beyond_its_limits_may_be_within_its_tolerance():
+    goal = {'joints': {'right_1': 2.05}, 'tolerance': {'joints': 0.06}}
+    assert problem_from_mapping(changed((('goal',), goal))).findings == ()
+    goal['tolerance']['joints'] = 0.04
+    assert only_finding((('goal',), goal)).field == 'goal.joints.right_1'
+
+
 def test_goal_of_nothing_but_a_tolerance_is_found():
     finding = only_finding((('goal',), {'tolerance': {'angle': 0.1}}))
     assert finding.field == 'goal'
-    assert 'at least one of object_pose, joints and contacts' in finding.expected
+    assert 'at least one of object_pose, position, orientation, joints' in finding.expected
 
 
 @pytest.mark.parametrize(

@@ -71,3 +71,31 @@ def test_leap_to_a_mirrored_branch_does_not_come_back_to_the_contacts() -> None:
     )
     middle = halfway(mechanism, before, after, contacts)
     assert not middle.reached or middle.detour > 0.25
+
+
+@pytest.mark.parametrize('balanced', [True, False])
+def test_half_way_of_two_contacts_balances_the_object_if_that_is_asked(balanced: bool) -> None:
+    """A square on two pegs is in balance upright: half-way between two slanted poses."""
+    width, half = 0.016, 0.02
+    pegs = [[(x - 1e-4, -0.05), (x + 1e-4, -0.05), (x, 0.0)] for x in (-width / 2, width / 2)]
+    thing = ManipulatedObject([(half, 0.0), (0.0, half), (-half, 0.0), (0.0, -half)], 0.1)
+
+    def pose(turn: float) -> tuple[float, float, float]:
+        corner = width / 2 * np.array([math.sin(2.0 * turn), -math.cos(2.0 * turn)])
+        return corner[0] - half * math.sin(turn), corner[1] + half * math.cos(turn), turn
+
+    joint = Joint('far_joint', -3.0, 3.0, 1.0, 5.0)
+    far = Finger('far', (0.3, 0.0), 0.0, (joint,), (Link('l', 0.03, pegs[0]),))
+    grasp = Grasp(pose(0.0), (1.0,))
+    hand = Hand(tuple(pegs), (far,))
+    problem = Problem('seat', (0.0, -9.81), hand, thing, 0.0, grasp, Goal(pose(0.0)))
+    mechanism = mechanism_of(problem)
+    contacts = [
+        parse_pair(name, mechanism) for name in ('object.e2|palm.0.v2', 'object.e3|palm.1.v2')
+    ]
+    before, after = (
+        mechanism.scene(np.array(pose(turn)), np.array([1.0])) for turn in (-0.01, 0.03)
+    )
+    middle = halfway(mechanism, before, after, contacts, balanced)
+    assert middle.reached
+    assert middle.scene.pose[2] == pytest.approx(0.0 if balanced else 0.01, abs=1e-6)

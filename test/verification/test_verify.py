@@ -344,6 +344,33 @@ def test_goal_joint_that_is_missed_is_found(sliding: Plan) -> None:
     assert failed(verify_plan(replace(problem, goal=goal), result)) == {'goal_joints'}
 
 
+@pytest.mark.parametrize(
+    ('part', 'check'), [('position', 'goal_position'), ('orientation', 'goal_angle')]
+)
+def test_part_of_a_goal_pose_that_is_missed_is_found(sliding: Plan, part: str, check: str) -> None:
+    problem, result = sliding
+    pose = result.object_poses[-1]
+    goals = [
+        Goal(position=(pose[0] + off, pose[1]))
+        if part == 'position'
+        else Goal(orientation=float(pose[2]) + 10.0 * off)
+        for off in (0.9e-4, 1.1e-4)
+    ]
+    near, far = (verify_plan(replace(problem, goal=goal), result) for goal in goals)
+    assert failed(near) == set()
+    assert failed(far) == {check}
+
+
+def test_contact_that_an_exact_goal_does_not_name_is_found(sliding: Plan) -> None:
+    problem, result = sliding
+    names = result.segments[-1].contacts
+    for contacts, expected in ((names, set()), (names[1:], {'goal_contacts'})):
+        goal = Goal(contacts=contacts, exact_contacts=True)
+        report = verify_plan(replace(problem, goal=goal), result)
+        assert failed(report) == expected
+    assert names[0] in report.failures[0].message
+
+
 def test_goal_contact_that_does_not_touch_is_found(sliding: Plan) -> None:
     problem, result = sliding
     goal = Goal(contacts=('object.e3|left.link.v1', 'object.e1|right.link.v1'))

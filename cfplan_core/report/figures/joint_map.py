@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from cfplan_core.contact.formation import Formation
 from cfplan_core.exploration import Exploration, configurations
 from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.planning.equations import is_second_order
 from cfplan_core.planning.pieces import Piece
 from cfplan_core.planning.sheet_graph import Sheet
 from cfplan_core.planning.sheets import Sheets
@@ -52,7 +53,7 @@ def joint_map(explored: Exploration, result: PlanResult | None = None) -> Figure
     two = explored.system.joint_count == 2
     height = _SIDE if two else max(1.2, _ROW * len(colours))
     entries = list(colours)[: len(COLOURS)]
-    legend = sum(_LINE * (len(formation) + 0.7) for formation in entries) + 0.7
+    legend = sum(_LINE * (len(_lines(explored, entry)) + 0.7) for entry in entries) + 0.7
     inner = max(height, legend)
     figure = new_figure(_LEFT + _SIDE + 0.15 + _LEGEND, _BOTTOM + inner + _TOP)
     axes = axes_at(figure, _LEFT, _BOTTOM + inner - height, _SIDE, height)
@@ -202,13 +203,19 @@ def _frame(axes: Axes, explored: Exploration, drawn: Sequence[Piece], rows: int)
     )
 
 
+def _lines(explored: Exploration, formation: Formation) -> list[str]:
+    """What the legend says of a formation."""
+    names = list(explored.system.contact_names(formation.pairs))
+    return [*names, '(second order)'] if is_second_order(formation) else names
+
+
 def _add_legend(
     figure: Figure, axes: Axes, explored: Exploration, colours: dict[Formation, str]
 ) -> None:
     handles, labels = axes.get_legend_handles_labels()
     for formation in list(colours)[: len(COLOURS)]:
         handles.append(Line2D([], [], color=colours[formation], linewidth=5, alpha=_STRONG))
-        labels.append('\n'.join(explored.system.contact_names(formation.pairs)))
+        labels.append('\n'.join(_lines(explored, formation)))
     if len(colours) > len(COLOURS):
         handles.append(Line2D([], [], color=FAINT, linewidth=5, alpha=_STRONG))
         labels.append(f'{len(colours) - len(COLOURS)} other formations')

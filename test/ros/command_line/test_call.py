@@ -74,22 +74,46 @@ def changed_story(tmp_path: Path, change: Callable[[dict[str, Any]], None]) -> P
     return file
 
 
+def tilted_story(tmp_path: Path) -> Path:
+    """The story with a goal of an orientation alone."""
+
+    def change(data: dict[str, Any]) -> None:
+        data['goal'] = {'orientation': -1.1, 'tolerance': {'angle': 0.05}}
+
+    return changed_story(tmp_path, change)
+
+
+@pytest.mark.parametrize(
+    ('goal', 'options'),
+    [
+        ('grasp', ()),
+        ('grasp', ('--max-needed-force', '3', '--stay-within', '-1,-1 1,-1 1,1 -1,1')),
+        ('orientation', ('--forbid', 'object.v2|palm.0.e2', '--resolution', '0.1')),
+        ('orientation', ('--prefer', 'shortest', '--alternatives', '2')),
+    ],
+    ids=['plain', 'bounds', 'constraints', 'alternatives'],
+)
 def test_answer_is_printed_and_written_as_the_planner_alone_does_it(
-    cfplan: Cfplan, start: Start, tmp_path: Path
+    goal: str, options: tuple[str, ...], cfplan: Cfplan, start: Start, tmp_path: Path
 ) -> None:
+    file = STORY_FILE if goal == 'grasp' else tilted_story(tmp_path)
+    options = ('--time-budget', str(TIMEOUT), *options)
     start('node', STORY_FILE)
-    called = cfplan('call', STORY_FILE, '--wait', TIMEOUT, '--json', 'call.json')
-    planned = cfplan('plan', STORY_FILE, '--json', 'plan.json')
+    called = cfplan('call', file, '--wait', TIMEOUT, '--json', 'call.json', *options)
+    planned = cfplan('plan', file, '--json', 'plan.json', *options)
     assert called.returncode == 0, called.stderr
     answer, record = called.stdout.rstrip().rsplit('\n', 1)
     without_times = [line for line in planned.stdout.splitlines() if 'planned in' not in line]
     assert [line for line in answer.splitlines() if 'planned in' not in line] == without_times
     assert (tmp_path / 'runs' / record.split()[-1]).exists()
-    first, second = (
-        json.loads((tmp_path / name).read_text()) for name in ('call.json', 'plan.json')
-    )
-    assert first['frames'] == second['frames']
-    assert first['segments'] == second['segments']
+    for suffix in ('', '.2') if '--alternatives' in options else ('',):
+        first, second = (
+            json.loads((tmp_path / f'{name}{suffix}.json').read_text())
+            for name in ('call', 'plan')
+        )
+        assert first['frames'] == second['frames']
+        assert first['segments'] == second['segments']
+        assert first['message'] == second['message']
 
 
 def test_figures_are_those_of_the_planner_alone(

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cfplan_msgs.msg import ElementalContact
+from cfplan_msgs.msg import ContactFormation, ElementalContact
 from cfplan_msgs.srv import PlanManipulation
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from hypothesis import given, settings
@@ -119,8 +119,37 @@ WRONG: list[tuple[str, Edit, str, int, str, str]] = [
     ('no start pose', lambda r: (put('start.object_pose', [])(r),
                                  put('start.object_angle', [])(r)),
      'start.object_pose', Response.INVALID_START, 'nothing', 'a pose'),
-    ('an angle without a pose', put('goal.object_pose', []), 'goal.object_angle',
-     Response.INVALID_GOAL, 'without a pose', 'object_pose'),
+    ('a start angle without a pose', put('start.object_pose', []), 'start.object_angle',
+     Response.INVALID_START, 'without a pose', 'object_pose'),
+    ('an angle of NaN alone', lambda r: (put('goal.object_pose', [])(r),
+                                         put('goal.object_angle', [NAN])(r)),
+     'goal.object_angle[0]', Response.INVALID_GOAL, '.nan', 'rad'),
+    ('a position beside a pose', put('goal.object_position', [Point()]),
+     'goal.object_position[0]', Response.INVALID_GOAL, 'beside object_pose', 'one of them'),
+    ('a position out of the plane', lambda r: (put('goal.object_pose', [])(r),
+                                               put('goal.object_position', [Point(z=0.1)])(r)),
+     'goal.object_position[0].z', Response.INVALID_GOAL, '0.1', '0'),
+    ('a position of the start', put('start.object_position', [Point()]),
+     'start.object_position', Response.INVALID_START, 'a position', 'none'),
+    ('exact contacts of the start', put('start.exact_contacts', True),
+     'start.exact_contacts', Response.INVALID_START, 'true', 'false'),
+    ('exact contacts without any', put('goal.exact_contacts', True),
+     'goal.exact_contacts', Response.INVALID_GOAL, 'without contacts', 'contacts'),
+    ('an unknown preference', put('options.prefer', 'best'),
+     'options.prefer', Response.INVALID_OPTIONS, "'best'", 'shortest'),
+    ('a resolution of NaN', put('options.resolution', NAN),
+     'options.resolution', Response.INVALID_OPTIONS, 'nan', '0.001 to 1 rad'),
+    ('a coarse resolution', put('options.resolution', 2.0),
+     'options.resolution', Response.INVALID_OPTIONS, '2.0', '0.001 to 1 rad'),
+    ('a negative force', put('options.max_needed_force', -1.0),
+     'options.max_needed_force', Response.INVALID_OPTIONS, '-1.0', 'weights above zero'),
+    ('a formation of nothing', put('options.required', [ContactFormation()]),
+     'options.required', Response.INVALID_OPTIONS, '()', 'at least one name'),
+    ('a region of a line', put('options.stay_within', [Point(x=x) for x in (0.0, 1.0, 2.0)]),
+     'options.stay_within', Response.INVALID_OPTIONS, '2.0', 'convex polygon'),
+    ('a region out of the plane',
+     put('options.stay_within', [Point(), Point(x=1.0, z=0.5), Point(x=1.0, y=1.0)]),
+     'options.stay_within[1].z', Response.INVALID_OPTIONS, '0.5', '0'),
     ('x of NaN', put('start.object_pose.0.position.x', NAN), 'start.object_pose[0].position.x',
      Response.INVALID_START, '.nan', 'm'),
     ('y of infinity', put('goal.object_pose.0.position.y', -INF), 'goal.object_pose[0].position.y',
@@ -231,7 +260,8 @@ def test_an_empty_goal_is_refused() -> None:
             'request',
             'goal',
             'nothing',
-            'at least one of object_pose, joints and contact_formation.contacts',
+            'at least one of object_pose, object_position, object_angle, joints and '
+            'contact_formation.contacts',
         ),
     )
 
@@ -468,6 +498,8 @@ def test_a_goal_contact_that_does_not_touch_is_told_in_the_words_of_the_request(
 def test_a_goal_that_only_the_planner_refuses_is_told_in_its_words() -> None:
     request = request_from_problem(STORY)
     problem, _ = problem_from_request(request, SETUP)
-    result = PlanResult('any', Status.INVALID, STORY.hand.joint_names, 'goal: cannot be')
+    wrong = (Finding('<problem>', 'goal', 'cannot be', ''),)
+    names = STORY.hand.joint_names
+    result = PlanResult('any', Status.INVALID, names, 'goal: cannot be', findings=wrong)
     error = invalid_grasps(result, problem, request, SETUP)
     assert (error.code, str(error)) == (Response.INVALID_GOAL, 'request: goal: cannot be')

@@ -53,6 +53,12 @@ def assert_same(one: PlanResult, other: PlanResult | None) -> None:
     assert other.statistics.planning_time == pytest.approx(planning_time, abs=0.51e-9)
     for part in ARRAYS:
         assert getattr(one, part).tobytes() == getattr(other, part).tobytes(), part
+    assert one.margin == other.margin
+    assert len(one.alternatives) == len(other.alternatives)
+    for first, second in zip(one.alternatives, other.alternatives, strict=True):
+        # Of the answer's time there is one.
+        statistics = replace(first.statistics, failures={})
+        assert_same(first, replace(second, statistics=statistics))
 
 
 @st.composite
@@ -274,3 +280,16 @@ def test_an_answer_that_does_not_fit_together_is_refused(
     edit(response.plan)
     with pytest.raises(InvalidPlanError, match=said):
         plan_result(response)
+
+
+def test_alternatives_their_margins_and_why_there_are_no_better_ones_are_answered(
+    story: Problem,
+) -> None:
+    options = PlanOptions(prefer='fewest-segments', alternatives=2, time_budget=100.0)
+    result = plan(story, options)
+    assert len(result.alternatives) == 1
+    assert result.margin is not None
+    response = response_of(result, 'palm', STAMP)
+    assert response.error_msg == ''
+    assert response.optimality == result.message
+    assert_same(result, plan_result(response))

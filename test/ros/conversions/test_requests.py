@@ -2,11 +2,13 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from cfplan_msgs.msg import PlanOptions as OptionsMessage
+from cfplan_msgs.srv import PlanManipulation
 from hypothesis import given
 from hypothesis import strategies as st
 from ros.conversions.example_files import STORY_FILE
@@ -18,6 +20,7 @@ from cfplan_core import (
     ManipulatedObject,
     PlanOptions,
     PlanResult,
+    Preference,
     Problem,
     Tolerance,
     load_problem,
@@ -28,6 +31,7 @@ from cfplan_ros.conversions.hands import load_hand, load_object
 from cfplan_ros.conversions.poses import pose_message
 from cfplan_ros.conversions.requests import (
     Setup,
+    invalid_grasps,
     problem_from_request,
     problem_mapping,
     request_from_problem,
@@ -46,6 +50,9 @@ def assert_identical(one: Problem, other: Problem) -> None:
     assert one.goal.contacts == other.goal.contacts
     assert one.goal.joints == other.goal.joints
     assert one.goal.tolerance == other.goal.tolerance
+    assert one.goal.orientation == other.goal.orientation
+    assert one.goal.exact_contacts == other.goal.exact_contacts
+    np.testing.assert_array_equal(one.goal.position, other.goal.position)
     assert one.object.mass == other.object.mass
     assert one.hand.joint_names == other.hand.joint_names
     assert (one.goal.object_pose is None) == (other.goal.object_pose is None)
@@ -270,3 +277,69 @@ def test_the_digest_may_be_left_out_or_written_in_capitals() -> None:
 def test_friction_is_not_silently_dropped() -> None:
     with pytest.raises(CfplanError, match=r'contact\.friction: got 0\.3, expected 0'):
         request_from_problem(replace(STORY, friction=0.3))
+
+
+@pytest.mark.parametrize(
+    'goal',
+    [
+        Goal(orientation=-7.5, tolerance=Tolerance(angle=0.3)),
+        Goal(position=(0.001, 0.02)),
+        Goal(position=(0.001, 0.02), orientation=4.0),
+        Goal(contacts=tuple(CONTACTS), exact_contacts=True),
+        Goal(orientation=0.25, joints={'left_joint': 0.7}, contacts=tuple(CONTACTS[:1])),
+    ],
+    ids=['orientation', 'position', 'both', 'formation', 'mix'],
+)
+def test_goal_in_part_is_the_same_after_its_way(goal: Goal) -> None:
+    problem = replace(STORY, goal=goal)
+    received, _ = problem_from_request(request_from_problem(problem), SETUP)
+    assert_identical(problem, received)
+
+
+EVERYTHING = PlanOptions(
+    time_budget=3.5,
+    max_nodes=77,
+    resolution=0.02,
+    max_needed_force=2.5,
+    max_contacts=4,
+    forbidden=(tuple(CONTACTS[:2]), (CONTACTS[2],)),
+    required=(tuple(CONTACTS[1:]),),
+    held_joints=('left_joint',),
+    stay_within=((-0.1, 0.0), (0.1, 0.0), (0.0, 0.1)),
+    second_order=False,
+    prefer=Preference.ROBUST,
+    alternatives=3,
+    seed=5,
+)
+
+
+@pytest.mark.parametrize('options', [PlanOptions(), EVERYTHING], ids=['none', 'all'])
+def test_options_are_the_same_after_their_way(options: PlanOptions) -> None:
+    _, received = problem_from_request(request_from_problem(STORY, options), SETUP)
+    assert received == options
+
+
+def test_every_option_is_asked_for_in_the_test_above() -> None:
+    default = PlanOptions()
+    same = [
+        f.name for f in fields(default) if getattr(EVERYTHING, f.name) == getattr(default, f.name)
+    ]
+    assert same == []
+
+
+def test_what_is_not_asked_is_left_to_the_planner() -> None:
+    request = request_from_problem(STORY)
+    request.options = OptionsMessage()
+    setup = replace(SETUP, default_preference='shortest', default_resolution=0.1)
+    _, options = problem_from_request(request, setup)
+    assert options == PlanOptions(prefer=Preference.SHORTEST, resolution=0.1)
+
+
+def test_options_that_only_the_problem_shows_to_be_wrong_are_named() -> None:
+    options = PlanOptions(held_joints=('thumb',))
+    request = request_from_problem(STORY, options)
+    problem, received = problem_from_request(request, SETUP)
+    error = invalid_grasps(plan(problem, received), problem, request, SETUP)
+    assert error.code == PlanManipulation.Response.INVALID_OPTIONS
+    assert [finding.field for finding in error.findings] == ['options.held_joints']
+    assert "'thumb'" in str(error)
