@@ -209,6 +209,28 @@ def test_bar_swings_down_as_its_wall_turns(seam: float | None) -> None:
     assert report.ok, report.failures
 
 
+@pytest.mark.parametrize('prefer', ['first', 'shortest'])
+@pytest.mark.parametrize('turn', [0.3, -0.4])
+def test_orientation_alone_is_reached_on_two_fingers(turn: float, prefer: str) -> None:
+    problem = two_fingers(())
+    start = symmetric(problem, 0.0)
+    problem = replace(problem, start=start, goal=Goal(orientation=turn))
+    result = plan(problem, PlanOptions(prefer=prefer))
+    assert result.solved, result.message
+    assert result.object_poses[-1, 2] == pytest.approx(turn, abs=1e-3)
+    report = verify_plan(problem, result)
+    assert report.ok, report.failures
+
+
+def test_goal_of_exactly_two_contacts_is_reached_by_letting_the_ledge_go() -> None:
+    pair = ('object.e2|palm.0.v2', 'object.e3|finger.link.v1')
+    problem = replace(LEDGES, goal=Goal(contacts=pair, exact_contacts=True))
+    result = plan(problem)
+    assert result.solved, result.message
+    assert result.segments[-1].contacts == pair
+    assert verify_plan(problem, result).ok
+
+
 def test_held_finger_leaves_a_curve() -> None:
     problem = two_fingers(())
     start = symmetric(problem, 0.002)
