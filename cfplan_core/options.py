@@ -32,8 +32,8 @@ class PlanOptions:
         time_budget: Seconds, or None for no limit.
         max_nodes: Nodes of both trees together, or None for no limit.
         resolution: Spacing of the grid of joint angles, rad, over which contact formations of
-            dimension 2 are explored; for hands of two joints. With constraints, preferences or
-            alternatives they are explored along rays instead.
+            dimension 2 are explored; for hands of two joints. For alternatives, and first of all
+            with constraints, they are explored along rays instead.
         max_needed_force: Largest force, in weights of the object, that the contacts may need to
             hold it in any frame of the plan, or None for no limit.
         max_contacts: Largest number of contacts in any configuration that is passed through, also
@@ -48,6 +48,8 @@ class PlanOptions:
         prefer: Which plan to choose; unless it is the first one found, the search goes on until no
             better one can exist or a budget is exhausted.
         alternatives: Number of plans wanted, with different sequences of contact formations.
+        seed: Of the generator that searches of hands with more than two joints draw from; the
+            same seed gives the same plan.
     """
 
     time_budget: float | None = None
@@ -62,6 +64,7 @@ class PlanOptions:
     second_order: bool = True
     prefer: Preference = Preference.FIRST
     alternatives: int = 1
+    seed: int = 0
 
     @property
     def optimal(self) -> bool:
@@ -87,6 +90,8 @@ class PlanOptions:
             raise CfplanError(
                 f'alternatives: got {self.alternatives}, expected a number above zero'
             )
+        if self.seed < 0:
+            raise CfplanError(f'seed: got {self.seed}, expected a whole number from 0')
         for field in ('forbidden', 'required'):
             if any(isinstance(names, str) or not names for names in getattr(self, field)):
                 raise CfplanError(

@@ -18,6 +18,7 @@ from cfplan_core.options import PlanOptions as PlanOptions
 from cfplan_core.options import Preference
 from cfplan_core.planning.best_first import BestFirst
 from cfplan_core.planning.best_on_mesh import Best, BestOnMesh
+from cfplan_core.planning.budget import BudgetExhaustedError
 from cfplan_core.planning.constraints import (
     REASONS,
     Constraints,
@@ -32,9 +33,17 @@ from cfplan_core.planning.manifold import settle
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.robustness import Robustness
+from cfplan_core.planning.sampled_search import SampledSearch
 from cfplan_core.planning.search import Leg, Search, Tree
+from cfplan_core.planning.ways import Cost
 from cfplan_core.trajectory.frames import build_frames, overloaded_legs, straying_legs
+from cfplan_core.trajectory.inspection import flaw
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
+
+# Hands of which more joints move are planned for by drives rather than piece by piece.
+_MOST_JOINTS_SEARCHED = 2
+# So many searches are made for each plan wanted where plans are compared and no budget is given.
+_SEARCHES = 6
 
 
 @dataclass(frozen=True)
@@ -57,10 +66,6 @@ class Progress:
 # Hands that everything is explored for.
 MOST_JOINTS = 2
 TOO_WEAK = 'a joint would exceed its effort limit'
-
-
-class _BudgetExhaustedError(Exception):
-    """A search must stop; the message says why."""
 
 
 def plan(
@@ -104,7 +109,8 @@ class _Planning:
         self.moving = self.system
         self.model = FrictionlessModel(self.system.load, self.options.second_order)
         self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
-        self.search: Search | BestFirst | None = None
+        self.robustness = Robustness(self.system, self.model)
+        self.search: Search | BestFirst | SampledSearch | None = None
 
     def run(self) -> PlanResult:
         examined = examine_problem(self.system, self.model)
@@ -138,6 +144,8 @@ class _Planning:
         if impossible:
             return self._answer(Status.INFEASIBLE, f'no path: {impossible}')
         try:
+            if self.moving.joint_count > _MOST_JOINTS_SEARCHED:
+                return self._search_samples(start, goals[-1])
             if self.options.optimal:
                 exact = self.options.alternatives == 1 and self.moving.joint_count <= MOST_JOINTS
                 search = self._search_all if exact else self._search_best
@@ -151,8 +159,10 @@ class _Planning:
                 if legs is None and quick:
                     self.roadmap = on_sheets
                     legs = self._search_goals(start, goals)
-        except _BudgetExhaustedError as stop:
-            return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
+        except BudgetExhaustedError as stop:
+            return self._answer(
+                Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}{self._sampled()}'
+            )
         if legs is None:
             nearest = goals[-1].how_near() if isinstance(goals[-1], GoalTest) else ''
             message = f'no path{nearest}; {self._explored()}{self._doubt()}'
@@ -221,26 +231,80 @@ class _Planning:
         """Legs in the coordinates of all joints."""
         return [replace(leg, points=self.moving.expanded(leg.points)) for leg in legs]
 
+    def _search_samples(self, start: FloatArray, goal: FloatArray | GoalTest) -> PlanResult:
+        """Search for plans of many joints: the first, or the best of several searches.
+
+        Raises:
+            BudgetExhaustedError: Before there was a plan.
+        """
+        options, stopped = self.options, ''
+        required = [GoalTest(self.moving, Goal(contacts=names)) for names in options.required]
+        self.search = search = SampledSearch(
+            self.roadmap, start, goal, required, options.seed, self._grown, self._flawed
+        )
+        paths = search.paths()
+        if options.prefer is Preference.FIRST and options.alternatives == 1:
+            return self._solved(next(paths), '')
+        rating = BestFirst(self.roadmap, start, goal, options.prefer, self._rate)
+        found: dict[tuple[Formation, ...], tuple[Cost, list[Leg]]] = {}
+        endless = options.time_budget is not None or options.max_nodes is not None
+        most = _SEARCHES * options.alternatives
+        try:
+            for legs in paths:
+                sequence = tuple(leg.formation for leg in legs)
+                rated = (rating.cost(legs), legs)
+                if sequence not in found or rated[0] < found[sequence][0]:
+                    found[sequence] = rated
+                if not endless and search.attempts >= most:
+                    break
+        except BudgetExhaustedError as stop:
+            if not found:
+                raise
+            stopped = f'; {stop}'
+        ranked = sorted(found.values(), key=lambda rated: rated[0])
+        name = Preference.FEWEST_SEGMENTS if options.prefer is Preference.FIRST else options.prefer
+        message = (
+            f'{name.value}: the best of {len(ranked)} different plans, by {search.attempts} '
+            f'searches that sample: a better one may exist{stopped}'
+        )
+        results = [
+            replace(self._solved(legs, message), margin=self._margin(legs))
+            for _, legs in ranked[: options.alternatives]
+        ]
+        return replace(results[0], alternatives=tuple(results[1:]))
+
+    def _rate(self, formation: Formation, z: FloatArray) -> float:
+        """Worst margin of a motion, shape (s, 3 + n), inside a formation."""
+        return self.robustness.ratios(formation, self.moving.expanded(z)).worst
+
+    def _margin(self, legs: Sequence[Leg]) -> float:
+        """Worst margin of a path."""
+        return self.robustness.margin(
+            [(leg.formation, self.moving.expanded(leg.points)) for leg in legs]
+        )
+
+    def _flawed(self, legs: Sequence[Leg]) -> bool:
+        """Tell whether a path cannot be used, with the reason noted."""
+        if self._refuse(legs):
+            return True
+        found = flaw(
+            self.system, self.model, build_frames(self.system, self.model, self._whole(legs))
+        )
+        if found is not None:
+            self.roadmap.failures[f'refused, as {found}'] += 1
+        return found is not None
+
     def _search_best(self, start: FloatArray, goal: FloatArray | GoalTest) -> PlanResult | None:
         """Search for the best plans, from the first one on; None if there is none at all.
 
         Motions that a joint's effort cannot hold are left out, and the search is run again.
         """
         options, stopped = self.options, ''
-        robustness = Robustness(self.system, self.model)
-
-        def rate(formation: Formation, z: FloatArray) -> float:
-            return robustness.ratios(formation, self.moving.expanded(z)).worst
-
-        def margin_of(legs: Sequence[Leg]) -> float:
-            return robustness.margin(
-                [(leg.formation, self.moving.expanded(leg.points)) for leg in legs]
-            )
 
         def settled(states: int) -> None:
             self._grown(states, 1)
 
-        best = BestFirst(self.roadmap, start, goal, options.prefer, rate, settled)
+        best = BestFirst(self.roadmap, start, goal, options.prefer, self._rate, settled)
         first, first_search = None, None
         if not options.required:
             first, first_search = self._search(start, goal), self.search
@@ -249,7 +313,7 @@ class _Planning:
         self.search = best
         try:
             best.choose(options.alternatives, first, self._refuse)
-        except _BudgetExhaustedError as stop:
+        except BudgetExhaustedError as stop:
             stopped = str(stop)
             best.settle_for_best(first, self._refuse)
         message = self._verdict(stopped, max(len(best.chosen), first is not None))
@@ -257,18 +321,17 @@ class _Planning:
         for label in best.chosen:
             best.conclude(label)
             legs, _ = label.path()
-            results.append(replace(self._solved(legs, message), margin=margin_of(legs)))
+            results.append(replace(self._solved(legs, message), margin=self._margin(legs)))
         if not results and first is not None:
             self.search = first_search
-            results = [replace(self._solved(first, message), margin=margin_of(first))]
+            results = [replace(self._solved(first, message), margin=self._margin(first))]
         if not results and stopped:
-            raise _BudgetExhaustedError(stopped)
+            raise BudgetExhaustedError(stopped)
         return replace(results[0], alternatives=tuple(results[1:])) if results else None
 
     def _search_all(self, start: FloatArray, goal: FloatArray | GoalTest) -> PlanResult | None:
         """Search everything that can be reached for the best plan; None if there is none."""
         prefer, stopped, best = self.options.prefer, '', None
-        robustness = Robustness(self.system, self.model)
         first = None
         if not self.options.required:
             first = self._search(start, goal)
@@ -276,21 +339,21 @@ class _Planning:
                 return None
         try:
             mesh = BestOnMesh(
-                self.roadmap, start, goal, robustness, self.moving.expanded, self._met
+                self.roadmap, start, goal, self.robustness, self.moving.expanded, self._met
             )
             best = mesh.choose(prefer, first, self._refuse)
             if best is None:
                 return None
-        except _BudgetExhaustedError as stop:
+        except BudgetExhaustedError as stop:
             if first is None:
                 raise
             stopped = str(stop)
         legs = first if best is None else best.legs
         assert legs is not None
-        whole = [(leg.formation, self.moving.expanded(leg.points)) for leg in legs]
-        margin = robustness.margin(whole)
+        margin = self._margin(legs)
         message = self._verdict_of_all(stopped, margin, best)
-        return replace(self._solved(legs, message), margin=margin)
+        bound = None if best is None else best.bound
+        return replace(self._solved(legs, message), margin=margin, margin_bound=bound)
 
     def _met(self, pieces: int) -> None:
         self._grown(pieces, 1)
@@ -368,18 +431,19 @@ class _Planning:
         """Search all that can be reached without what the joints cannot hold, if that is known."""
         if self.moving.joint_count > MOST_JOINTS:
             return None
-        robustness = Robustness(self.system, self.model)
-        mesh = BestOnMesh(self.roadmap, start, goal, robustness, self.moving.expanded, self._met)
+        mesh = BestOnMesh(
+            self.roadmap, start, goal, self.robustness, self.moving.expanded, self._met
+        )
         best = mesh.choose(Preference.FEWEST_SEGMENTS, None, self._refuse)
         return None if best is None else best.legs
 
     def _checkpoint(self) -> None:
         """Stop the search when it has to."""
         if self.cancel is not None and self.cancel.is_set():
-            raise _BudgetExhaustedError('cancelled')
+            raise BudgetExhaustedError('cancelled')
         budget = self.options.time_budget
         if budget is not None and time.perf_counter() - self.began > budget:
-            raise _BudgetExhaustedError(f'time budget of {budget:g} s exhausted')
+            raise BudgetExhaustedError(f'time budget of {budget:g} s exhausted')
 
     def _grown(self, initial: int, goal: int) -> None:
         if self.progress is not None:
@@ -388,7 +452,7 @@ class _Planning:
             self.progress(Progress(elapsed, (initial, goal), formations, 'growing the CF-trees'))
         limit = self.options.max_nodes
         if limit is not None and initial + goal > limit:
-            raise _BudgetExhaustedError(f'budget of {limit} nodes exhausted')
+            raise BudgetExhaustedError(f'budget of {limit} nodes exhausted')
 
     def _explored(self) -> str:
         """What was searched, and why it did not lead on."""
@@ -396,6 +460,16 @@ class _Planning:
         return (
             f'explored {self.roadmap.formations()} contact formations by '
             f'{self.roadmap.attempts} transitions; most frequent failures: {failures or "none"}'
+        )
+
+    def _sampled(self) -> str:
+        """What an answer without a plan means if the search was by sampling."""
+        if not isinstance(self.search, SampledSearch):
+            return ''
+        return (
+            f'. With more than {_MOST_JOINTS_SEARCHED} joints the search samples: it pushed along '
+            f'{self.search.drives} drives, seed {self.options.seed}, which does not show that '
+            'there is no plan'
         )
 
     def _doubt(self) -> str:

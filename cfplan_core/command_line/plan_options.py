@@ -129,6 +129,13 @@ def wanted_plan(command: Command) -> Command:
             help='Keep the object inside this convex polygon: corners in m, counter-clockwise.',
         ),
         second_order_option,
+        click.option(
+            '--seed',
+            type=click.IntRange(min=0),
+            default=0,
+            metavar='N',
+            help='Draw from another generator, for hands of more than two joints.',
+        ),
     ]
     for option in reversed([*options, resolution_option]):
         command = option(command)

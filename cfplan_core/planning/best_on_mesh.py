@@ -69,10 +69,7 @@ class BestOnMesh:
         self.pieces, crossings = reachable(roadmap, roadmap.root(start), met)
         ends = [(self.pieces[0], start), *self._goals(start, goal)]
         self._mesh, (self._start, *self._arrivals) = build_mesh(self.pieces, crossings, ends)
-        lengths = {motion: joint_length(motion.points) for motion in self._mesh.motions}
-        self._search = MeshSearch(
-            self._mesh, self._start, self._arrivals, roadmap.constraints, lengths
-        )
+        self._search = MeshSearch(self._mesh, self._start, self._arrivals, roadmap.constraints)
         self._margins: MeshMargins | None = None
 
     def _goals(
@@ -110,6 +107,8 @@ class BestOnMesh:
         """
         if prefer is Preference.FIRST:
             prefer = Preference.FEWEST_SEGMENTS
+        if prefer is Preference.SHORTEST:
+            self._mesh.add_diagonals()
         while True:
             best = self._best(prefer, known)
             if best is None:

@@ -20,6 +20,8 @@ from cfplan_core.planning.tracing import STEP
 COMFORTABLE = 0.02
 # Part of the tolerance that is used up to get that far from an end.
 _USED = 0.9
+# Nearer to an end of a curve, in radians and object sizes, is next to it.
+_NEXT = 1e-5
 # Ratios up to this are inside for sure.
 _INSIDE = 1.0 - 1e-6
 _ITERATIONS = 12
@@ -59,8 +61,15 @@ class CurveGoal:
         for sample in self._dips():
             z = self._lowest(sample)
             if self._region.fits(z):
-                return self._inside(z)
+                return self.snapped(self._inside(z))
         return None
+
+    def snapped(self, z: FloatArray) -> FloatArray:
+        """An end of the curve that a configuration is next to, if that will do; else itself."""
+        for end in (self._points[0], self._points[-1]):
+            if np.abs(end - z).max() < _NEXT and self._region.fits(end):
+                return np.asarray(end)
+        return z
 
     def stretches(self) -> list[tuple[float, float]]:
         """First and last place of every stretch within the tolerance, in ascending order."""
@@ -101,6 +110,7 @@ class CurveGoal:
 
     @cached_property
     def _rows(self) -> IntArray:
+        """Independent equations of the curve."""
         middle = self._points[len(self._points) // 2]
         return formation_equations(self._system, self._pairs, middle)[0]
 

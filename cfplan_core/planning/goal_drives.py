@@ -6,9 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from cfplan_core.contact.detection import touching
+from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.events import EventKind
 from cfplan_core.planning.goal_region import GoalRegion
+from cfplan_core.planning.grasp_check import TOUCHING
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import Tracer
@@ -58,10 +61,20 @@ def drive(
             return None
         ended = ended or bool(others)
     ratios = goal.ratios(points)
-    if ended and len(points) > 1 and ratios[:-1].min() <= 1.0:
-        ratios = ratios[:-1]
-    nearest = int(np.argmin(ratios))
-    return points[: nearest + 1] if ratios[nearest] <= 1.0 else None
+    if ended and ratios[-1] <= 1.0:
+        # Of all that will do the border is the last choice.
+        ratios[-1] = 1.0
+    for nearest in np.argsort(ratios, kind='stable'):
+        if ratios[nearest] > 1.0:
+            break
+        if lies_inside(tracer.system, region, points[nearest]):
+            return points[: nearest + 1]
+    return None
+
+
+def lies_inside(system: ContactSystem, region: Region, z: FloatArray) -> bool:
+    """Tell whether nothing but a region's contacts touches, by as much as files are rounded."""
+    return tuple(touching(system, z, TOUCHING / system.size).tolist()) == region.formation.pairs
 
 
 def drives(

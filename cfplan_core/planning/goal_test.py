@@ -11,6 +11,7 @@ from cfplan_core.contact.system import ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Goal
 from cfplan_core.planning.goal_curves import CurveGoal
+from cfplan_core.planning.goal_drives import lies_inside
 from cfplan_core.planning.goal_region import GoalRegion
 from cfplan_core.planning.pieces import Piece, Region
 from cfplan_core.planning.sheet_graph import configurations
@@ -104,7 +105,7 @@ class GoalTest:
             yield entry
             return
         for stretch in self._inner_stretches(curve):
-            z = curve.at(np.clip([begin], *stretch))[0]
+            z = curve.snapped(curve.at(np.clip([begin], *stretch))[0])
             if self.fits(z):
                 yield z
 
@@ -128,7 +129,7 @@ class GoalTest:
         for low, high in self._inner_stretches(curve):
             between = np.arange(np.floor(low) + 1.0, np.ceil(high))
             places = np.concatenate([[low], between, [high] if high > low else []])
-            yield from (z for z in curve.at(places) if self.fits(z))
+            yield from (z for z in map(curve.snapped, curve.at(places)) if self.fits(z))
 
     def _inner_stretches(self, curve: CurveGoal) -> Iterator[tuple[float, float]]:
         """Stretches of a curve that fulfil the goal, with contacts away from the curve's ends."""
@@ -165,7 +166,9 @@ class GoalTest:
     ) -> Iterator[FloatArray]:
         if self.may_hold(piece):
             self._note(configurations(piece))
-            yield from (z for z in regions.reach(piece, self.region, entry) if self.fits(z))
+            for z in regions.reach(piece, self.region, entry):
+                if self.fits(z) and lies_inside(self._system, piece, z):
+                    yield z
 
     def _note(self, z: FloatArray) -> None:
         """Remember the configuration that is nearest to the goal."""

@@ -188,19 +188,29 @@ def settle(system: ContactSystem, z: FloatArray, rows: IntArray) -> FloatArray:
         Shape (3 + n,), by Gauss-Newton steps of least norm. Joints that these would take beyond a
         limit stay at it where the contacts allow.
     """
-    settled = _settle(system, z, rows, np.ones(system.dof, dtype=bool))
+    settled = settle_in(system, z, rows, np.ones(system.dof, dtype=bool))
     clipped = settled.copy()
     clipped[3:] = np.clip(settled[3:], system.lower, system.upper)
     free = clipped == settled
     if free.all():
         return settled
-    held = _settle(system, clipped, rows, free)
+    held = settle_in(system, clipped, rows, free)
     off = np.abs(equations(system, system.place(held[None]), rows)[0]).max()
     return held if off < _TOUCHING else settled
 
 
-def _settle(system: ContactSystem, z: FloatArray, rows: IntArray, free: BoolArray) -> FloatArray:
-    """Gauss-Newton steps of least norm in the free coordinates."""
+def settle_in(system: ContactSystem, z: FloatArray, rows: IntArray, free: BoolArray) -> FloatArray:
+    """Move a configuration to where equations hold, in some of its coordinates alone.
+
+    Args:
+        system: Compiled problem.
+        z: Shape (3 + n,).
+        rows: Equations, dependent or not, shape (k,).
+        free: Shape (3 + n,), true for the coordinates that may change.
+
+    Returns:
+        Shape (3 + n,), by Gauss-Newton steps of least norm.
+    """
     z = z.copy()
     for _ in range(_ITERATIONS):
         placed = system.place(z[None])

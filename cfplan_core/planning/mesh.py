@@ -18,6 +18,10 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.pieces import SAME, Piece, Region
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.sheet_graph import Sheet
+from cfplan_core.planning.ways import joint_length
+
+# Sides of a cell whose steps have a smaller product, rad², make a right angle.
+_SQUARE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,12 +33,14 @@ class Motion:
         second: Node that it leads to; it is an edge in both directions.
         piece: Inside which it is; None from piece to piece.
         points: Shape (s, 3 + n), from first to second.
+        length: Of the joints' path, rad; of the straight one over the corner of a sheet's cell.
     """
 
     first: int
     second: int
     piece: Piece | None
     points: FloatArray
+    length: float
 
     def towards(self, node: int) -> FloatArray:
         """Points in the order that ends at one of its nodes."""
@@ -66,7 +72,36 @@ class Mesh:
 
     def connect(self, first: int, second: int, piece: Piece | None, points: FloatArray) -> None:
         """Add an edge."""
-        motion = Motion(first, second, piece, points)
+        self._add(Motion(first, second, piece, points, joint_length(points)))
+
+    def add_diagonals(self) -> None:
+        """Add motions over two sides of a sheet's cell that count as straight.
+
+        Without them a way over the grid is up to 1.41 times as long as the straight one, and with
+        them 1.08 times.
+        """
+        known = {(motion.first, motion.second) for motion in self.motions}
+        diagonals = []
+        for node, piece in enumerate(self.pieces):
+            if not isinstance(piece, Sheet):
+                continue
+            sides = [(u, motion) for u, motion in self.around[node] if motion.piece is piece]
+            for corner, side in sides:
+                for other, next_side in self.around[corner]:
+                    if next_side.piece is not piece or other <= node or (node, other) in known:
+                        continue
+                    one, two = self.z[corner] - self.z[node], self.z[other] - self.z[corner]
+                    if abs(float(one[3:] @ two[3:])) > _SQUARE:
+                        continue
+                    known.add((node, other))
+                    points = np.concatenate([side.towards(corner), next_side.towards(other)[1:]])
+                    straight = float(np.linalg.norm(one[3:] + two[3:]))
+                    diagonals.append(Motion(node, other, piece, points, straight))
+        for motion in diagonals:
+            self._add(motion)
+
+    def _add(self, motion: Motion) -> None:
+        first, second = motion.first, motion.second
         self.motions.append(motion)
         self.around[first].append((second, motion))
         if second != first:

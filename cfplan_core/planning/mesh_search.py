@@ -60,7 +60,6 @@ class MeshSearch:
         start: int,
         goals: Collection[int],
         constraints: Constraints,
-        lengths: dict[Motion, float],
     ) -> None:
         """Prepare.
 
@@ -69,13 +68,11 @@ class MeshSearch:
             start: A node.
             goals: Nodes of which one is to be reached.
             constraints: Say which formations are required.
-            lengths: Of the joints' paths, rad.
         """
         self.banned: set[Motion] = set()
         self._mesh = mesh
         self._start = start
         self._goals = frozenset(goals)
-        self._lengths = lengths
         self._passing = [
             sum(
                 1 << k
@@ -127,7 +124,7 @@ class MeshSearch:
                 moves = motion.piece is not None
                 passed = state.passed | self._passing[other]
                 after = _State(other, first_of_all and moves, passed, touched)
-                added = self._lengths[motion]
+                added = motion.length
                 if first_of_all and moves and not state.moved:
                     added += _SEGMENT
                 if so_far + added < cost.get(after, float('inf')):

@@ -24,6 +24,8 @@ from cfplan_core.planning.tracing import Tracer
 # Stability margins above this part of the largest on a sheet are comfortable.
 _COMFORTABLE = 0.5
 _SAMPLES = 17
+# Steps over the grid after which a vertex is too far from a goal to be driven from.
+_MOST_STEPS = 4.0
 # Vertices that are driven from, before the borders are looked at.
 _MOST_DRIVES = 40
 
@@ -58,7 +60,11 @@ def goals_on_sheet(
         yield from _crossings(tracer, sheet, rows, goal, vertices, offsets[:, 0], order)
     ratios = goal.ratios(vertices)
     within = ratios <= 1.0
-    lowest = [k for k in order if within[k] or _is_lowest(sheet, ratios, k)]
+    lowest = [
+        k
+        for k in order
+        if within[k] or (_is_lowest(sheet, ratios, k) and _may_reach(sheet, offsets, k))
+    ]
     if near is None:
         yield from (vertices[k][None] for k in np.flatnonzero(within))
         lowest = [k for k in lowest if not within[k]]
@@ -82,6 +88,15 @@ def _order(tracer: Tracer, sheet: Sheet, vertices: FloatArray, near: FloatArray)
 def _is_lowest(sheet: Sheet, ratios: FloatArray, vertex: int) -> bool:
     """Tell whether no vertex beside one is nearer to the goal."""
     return all(ratios[vertex] <= ratios[other] for other in sheet.edges[vertex])
+
+
+def _may_reach(sheet: Sheet, offsets: FloatArray, vertex: int) -> bool:
+    """Tell whether the goal may lie within a few steps, by how much one step changes."""
+    beside = list(sheet.edges[vertex])
+    if not beside:
+        return True
+    change = np.abs(offsets[beside] - offsets[vertex]).max(axis=0)
+    return bool((np.abs(offsets[vertex]) - 1.0 <= _MOST_STEPS * change).all())
 
 
 def _crossings(

@@ -131,6 +131,20 @@ def crossings(
     return _distinct(found)
 
 
+def departure_along(
+    around: Surroundings,
+    model: ContactModel,
+    direction: FloatArray,
+    dimension: int,
+    failures: Counter[str],
+) -> Departure | None:
+    """Return the departure along a unit vector, shape (3 + n,), if there is one.
+
+    The direction decides which contacts are kept; together they must leave this dimension free.
+    """
+    return _leave(around, model, direction, dimension, failures)
+
+
 def _distinct(found: Iterable[Departure | None]) -> list[Departure]:
     """Departures that differ, ordered by their contacts, then as they were found."""
     kept: list[Departure] = []

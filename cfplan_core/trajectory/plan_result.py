@@ -105,6 +105,7 @@ class PlanResult:
             the frame itself carries those of the segment before. Not in plan files.
         entry_upper: As `entry_lower`.
         margin: Worst robustness margin of the plan, where it was chosen among several, else None.
+        margin_bound: No plan has a larger margin, at the resolution stated; None if not asked.
         alternatives: Other plans, the next best first, each without further ones.
         findings: Everything that is wrong, if invalid. Not in plan files.
     """
@@ -125,6 +126,7 @@ class PlanResult:
     entry_lower: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     entry_upper: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     margin: float | None = None
+    margin_bound: float | None = None
     alternatives: tuple[PlanResult, ...] = ()
     findings: tuple[Finding, ...] = ()
 

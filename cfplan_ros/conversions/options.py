@@ -43,6 +43,7 @@ def constraint_values(message: OptionsMessage, setup: Setup) -> dict[str, Any]:
         'held_joints': tuple(message.held_joints),
         'stay_within': tuple((float(p.x), float(p.y)) for p in message.stay_within) or None,
         'second_order': not message.no_second_order,
+        'seed': int(message.seed),
     }
 
 
@@ -82,11 +83,12 @@ def constraint_message(options: PlanOptions) -> OptionsMessage:
         resolution=float(options.resolution),
         max_needed_force=float(options.max_needed_force or 0.0),
         max_contacts=options.max_contacts or 0,
+        no_second_order=not options.second_order,
+        seed=options.seed,
         forbidden=[formation_message(names) for names in options.forbidden],
         required=[formation_message(names) for names in options.required],
         held_joints=list(options.held_joints),
         stay_within=[Point(x=float(x), y=float(y), z=0.0) for x, y in options.stay_within or ()],
-        no_second_order=not options.second_order,
     )
 
 

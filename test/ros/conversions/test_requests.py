@@ -309,6 +309,7 @@ EVERYTHING = PlanOptions(
     second_order=False,
     prefer=Preference.ROBUST,
     alternatives=3,
+    seed=5,
 )
 
 
