@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from planning.pegs import HALF, WIDTH, cradle, formation, lowest_nearby, swing, two_fingers
+from planning.pegs import HALF, WIDTH, cradle, finger, formation, lowest_nearby, swing, two_fingers
 
 from cfplan_core import (
     PlanOptions,
@@ -228,6 +228,22 @@ def test_goal_of_exactly_two_contacts_is_reached_by_letting_the_ledge_go() -> No
     result = plan(problem)
     assert result.solved, result.message
     assert result.segments[-1].contacts == pair
+    assert verify_plan(problem, result).ok
+
+
+@pytest.mark.parametrize('prefer', ['first', 'shortest'])
+def test_hand_of_three_joints_moves_what_two_of_its_fingers_hold(prefer: str) -> None:
+    problem = two_fingers(())
+    far = finger('far', (0.3, 0.0))
+    start, goal = (
+        Grasp(grasp.object_pose, (*grasp.joints, angle))
+        for grasp, angle in ((symmetric(problem, 0.0), 1.0), (symmetric(problem, 0.004), 1.2))
+    )
+    hand = replace(problem.hand, fingers=(*problem.hand.fingers, far))
+    problem = moved(replace(problem, hand=hand), start, goal)
+    result = plan(problem, PlanOptions(prefer=prefer))
+    assert result.solved, result.message
+    assert {segment.stability for segment in result.segments} == {'second_order'}
     assert verify_plan(problem, result).ok
 
 
