@@ -25,7 +25,7 @@ from cfplan_core.planning.constraints import (
     compile_constraints,
     contradictions,
 )
-from cfplan_core.planning.equations import formation_rows
+from cfplan_core.planning.equations import formation_rows, is_second_order
 from cfplan_core.planning.goal_limits import why_impossible
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.grasp_check import ExaminedProblem, examine_problem
@@ -144,7 +144,7 @@ class _Planning:
         if impossible:
             return self._answer(Status.INFEASIBLE, f'no path: {impossible}')
         try:
-            if self.moving.joint_count > _MOST_JOINTS_SEARCHED:
+            if self.moving.joint_count > _MOST_JOINTS_SEARCHED and not _held_by_two(examined):
                 return self._search_samples(start, goals[-1])
             if self.options.optimal:
                 exact = self.options.alternatives == 1 and self.moving.joint_count <= MOST_JOINTS
@@ -523,3 +523,9 @@ class _Planning:
             )
             for node in tree.nodes
         )
+
+
+def _held_by_two(examined: ExaminedProblem) -> bool:
+    """Tell whether two contacts hold the start or the goal: sampling finds no way from there."""
+    grasps = [grasp for grasp in (examined.start, examined.goal) if grasp is not None]
+    return any(is_second_order(grasp.pairs) for grasp in grasps)
