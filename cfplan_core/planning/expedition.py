@@ -41,6 +41,8 @@ _TRIED = 0.15
 _MET = 1e-7
 # Poses of the object, in radians and object sizes, that count as the same.
 _SAME_POSE = 1e-8
+# Part of the drives to a pose that are to an angle alone.
+_TURNS = 0.5
 # Fingers are moved one by one where the object's poses differ by no more than this.
 _GAIT = 0.5
 # How much farther away a configuration counts for every body that touches in one only.
@@ -266,8 +268,11 @@ class Expedition:
             roots = [growth.table[0] for growth in self._growths]
             between = roots[0] + rng.random() * (roots[-1] - roots[0])
             wanted[:3] = between[:3] + rng.normal(size=3) * [0.2, 0.2, 0.3]
-            begin = self._nearest(growth, wanted, _pose_weights(system.dof))
-            return begin, ToConfiguration(wanted, _pose_weights(system.dof), free), on_edges
+            weights = _pose_weights(system.dof)
+            if rng.random() < _TURNS:
+                weights[:2] = 0.0
+            begin = self._nearest(growth, wanted, weights)
+            return begin, ToConfiguration(wanted, weights, free), on_edges
         if kind < 0.8:
             drive = placements(system, begin, rng)
             if drive is not None:
