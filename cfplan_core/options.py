@@ -46,6 +46,8 @@ class PlanOptions:
         prefer: Which plan to choose; unless it is the first one found, the search goes on until no
             better one can exist or a budget is exhausted.
         alternatives: Number of plans wanted, with different sequences of contact formations.
+        seed: Of the generator that searches of hands with more than two joints draw from; the
+            same seed gives the same plan.
     """
 
     time_budget: float | None = None
@@ -59,6 +61,7 @@ class PlanOptions:
     stay_within: tuple[tuple[float, float], ...] | None = None
     prefer: Preference = Preference.FIRST
     alternatives: int = 1
+    seed: int = 0
 
     @property
     def optimal(self) -> bool:
@@ -84,6 +87,8 @@ class PlanOptions:
             raise CfplanError(
                 f'alternatives: got {self.alternatives}, expected a number above zero'
             )
+        if self.seed < 0:
+            raise CfplanError(f'seed: got {self.seed}, expected a whole number from 0')
         for field in ('forbidden', 'required'):
             if any(isinstance(names, str) or not names for names in getattr(self, field)):
                 raise CfplanError(

@@ -17,24 +17,29 @@ from cfplan_core.model import Goal, Problem
 from cfplan_core.options import PlanOptions as PlanOptions
 from cfplan_core.options import Preference
 from cfplan_core.planning.best_first import BestFirst
+from cfplan_core.planning.budget import BudgetExhaustedError
 from cfplan_core.planning.constraints import (
     REASONS,
     compile_constraints,
     contradictions,
 )
-from cfplan_core.planning.expedition import Expedition
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.manifold import settle
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.robustness import Robustness
+from cfplan_core.planning.sampled_search import SampledSearch
 from cfplan_core.planning.search import Leg, Search, Tree
+from cfplan_core.planning.ways import Cost
 from cfplan_core.trajectory.frames import build_frames, overloaded_legs, straying_legs
+from cfplan_core.trajectory.inspection import flaw
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
 
-# Hands with more joints are planned for by drives rather than piece by piece.
+# Hands of which more joints move are planned for by drives rather than piece by piece.
 _MOST_JOINTS_SEARCHED = 2
+# So many searches are made for each plan wanted where plans are compared and no budget is given.
+_SEARCHES = 6
 
 
 @dataclass(frozen=True)
@@ -55,10 +60,6 @@ class Progress:
 
 
 TOO_WEAK = 'a joint would exceed its effort limit'
-
-
-class _BudgetExhaustedError(Exception):
-    """A search must stop; the message says why."""
 
 
 def plan(
@@ -102,7 +103,8 @@ class _Planning:
         self.moving = self.system
         self.model = FrictionlessModel(self.system.load)
         self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
-        self.search: Search | BestFirst | Expedition | None = None
+        self.robustness = Robustness(self.system, self.model)
+        self.search: Search | BestFirst | SampledSearch | None = None
 
     def run(self) -> PlanResult:
         examined = examine_problem(self.system, self.model)
@@ -135,6 +137,8 @@ class _Planning:
         except CfplanError as error:
             return self._answer(Status.INVALID, f'goal: {error}')
         try:
+            if self.moving.joint_count > _MOST_JOINTS_SEARCHED:
+                return self._search_samples(start, goal)
             if self.options.optimal:
                 best = self._search_best(start, goal)
                 if best is not None:
@@ -142,8 +146,10 @@ class _Planning:
                 legs = None
             else:
                 legs = self._search(start, goal)
-        except _BudgetExhaustedError as stop:
-            return self._answer(Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}')
+        except BudgetExhaustedError as stop:
+            return self._answer(
+                Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}{self._sampled()}'
+            )
         if legs is None:
             return self._answer(Status.INFEASIBLE, f'no path; {self._explored()}{self._doubt()}')
         return self._solved(legs, '')
@@ -176,21 +182,74 @@ class _Planning:
         """Legs in the coordinates of all joints."""
         return [replace(leg, points=self.moving.expanded(leg.points)) for leg in legs]
 
+    def _search_samples(self, start: FloatArray, goal: FloatArray | GoalTest) -> PlanResult:
+        """Search for plans of many joints: the first, or the best of several searches.
+
+        Raises:
+            BudgetExhaustedError: Before there was a plan.
+        """
+        options, stopped = self.options, ''
+        required = [GoalTest(self.moving, Goal(contacts=names)) for names in options.required]
+        self.search = search = SampledSearch(
+            self.roadmap, start, goal, required, options.seed, self._grown, self._flawed
+        )
+        paths = search.paths()
+        if options.prefer is Preference.FIRST and options.alternatives == 1:
+            return self._solved(next(paths), '')
+        rating = BestFirst(self.roadmap, start, goal, options.prefer, self._rate)
+        found: dict[tuple[Formation, ...], tuple[Cost, list[Leg]]] = {}
+        endless = options.time_budget is not None or options.max_nodes is not None
+        most = _SEARCHES * options.alternatives
+        try:
+            for legs in paths:
+                sequence = tuple(leg.formation for leg in legs)
+                rated = (rating.cost(legs), legs)
+                if sequence not in found or rated[0] < found[sequence][0]:
+                    found[sequence] = rated
+                if not endless and search.attempts >= most:
+                    break
+        except BudgetExhaustedError as stop:
+            if not found:
+                raise
+            stopped = f'; {stop}'
+        ranked = sorted(found.values(), key=lambda rated: rated[0])
+        name = Preference.FEWEST_SEGMENTS if options.prefer is Preference.FIRST else options.prefer
+        message = (
+            f'{name.value}: the best of {len(ranked)} different plans, by {search.attempts} '
+            f'searches that sample: a better one may exist{stopped}'
+        )
+        results = [
+            replace(self._solved(legs, message), margin=rating.margin(legs))
+            for _, legs in ranked[: options.alternatives]
+        ]
+        return replace(results[0], alternatives=tuple(results[1:]))
+
+    def _rate(self, formation: Formation, z: FloatArray) -> float:
+        """Worst margin of a motion, shape (s, 3 + n), inside a formation."""
+        return self.robustness.ratios(formation, self.moving.expanded(z)).worst
+
+    def _flawed(self, legs: Sequence[Leg]) -> bool:
+        """Tell whether a path cannot be used, with the reason noted."""
+        if self._refuse(legs):
+            return True
+        found = flaw(
+            self.system, self.model, build_frames(self.system, self.model, self._whole(legs))
+        )
+        if found is not None:
+            self.roadmap.failures[f'refused, as {found}'] += 1
+        return found is not None
+
     def _search_best(self, start: FloatArray, goal: FloatArray | GoalTest) -> PlanResult | None:
         """Search for the best plans, from the first one on; None if there is none at all.
 
         Motions that a joint's effort cannot hold are left out, and the search is run again.
         """
         options, stopped = self.options, ''
-        robustness = Robustness(self.system, self.model)
-
-        def rate(formation: Formation, z: FloatArray) -> float:
-            return robustness.ratios(formation, self.moving.expanded(z)).worst
 
         def settled(states: int) -> None:
             self._grown(states, 1)
 
-        best = BestFirst(self.roadmap, start, goal, options.prefer, rate, settled)
+        best = BestFirst(self.roadmap, start, goal, options.prefer, self._rate, settled)
         first, first_search = None, None
         if not options.required:
             first, first_search = self._search(start, goal), self.search
@@ -199,7 +258,7 @@ class _Planning:
         self.search = best
         try:
             best.choose(options.alternatives, first, self._refuse)
-        except _BudgetExhaustedError as stop:
+        except BudgetExhaustedError as stop:
             stopped = str(stop)
             best.settle_for_best(first, self._refuse)
         message = self._verdict(stopped, max(len(best.chosen), first is not None))
@@ -212,7 +271,7 @@ class _Planning:
             self.search = first_search
             results = [replace(self._solved(first, message), margin=best.margin(first))]
         if not results and stopped:
-            raise _BudgetExhaustedError(stopped)
+            raise BudgetExhaustedError(stopped)
         return replace(results[0], alternatives=tuple(results[1:])) if results else None
 
     def _refuse(self, legs: Sequence[Leg]) -> list[int]:
@@ -246,11 +305,6 @@ class _Planning:
         are blocked, ways through regions forgotten, and the search is run again on the roadmap
         that is there.
         """
-        if self.system.joint_count > _MOST_JOINTS_SEARCHED:
-            self.search = expedition = Expedition(self.roadmap, start, goal, self._grown)
-            if not expedition.run():
-                raise _BudgetExhaustedError(f'no path found by {expedition.drives} drives')
-            return expedition.path()
         blocked: frozenset[int] = frozenset()
         while True:
             self.search = search = Search(self.roadmap, start, goal, blocked, self._grown)
@@ -276,10 +330,10 @@ class _Planning:
     def _checkpoint(self) -> None:
         """Stop the search when it has to."""
         if self.cancel is not None and self.cancel.is_set():
-            raise _BudgetExhaustedError('cancelled')
+            raise BudgetExhaustedError('cancelled')
         budget = self.options.time_budget
         if budget is not None and time.perf_counter() - self.began > budget:
-            raise _BudgetExhaustedError(f'time budget of {budget:g} s exhausted')
+            raise BudgetExhaustedError(f'time budget of {budget:g} s exhausted')
 
     def _grown(self, initial: int, goal: int) -> None:
         if self.progress is not None:
@@ -288,7 +342,7 @@ class _Planning:
             self.progress(Progress(elapsed, (initial, goal), formations, 'growing the CF-trees'))
         limit = self.options.max_nodes
         if limit is not None and initial + goal > limit:
-            raise _BudgetExhaustedError(f'budget of {limit} nodes exhausted')
+            raise BudgetExhaustedError(f'budget of {limit} nodes exhausted')
 
     def _explored(self) -> str:
         """What was searched, and why it did not lead on."""
@@ -296,6 +350,16 @@ class _Planning:
         return (
             f'explored {self.roadmap.formations()} contact formations by '
             f'{self.roadmap.attempts} transitions; most frequent failures: {failures or "none"}'
+        )
+
+    def _sampled(self) -> str:
+        """What an answer without a plan means if the search was by sampling."""
+        if not isinstance(self.search, SampledSearch):
+            return ''
+        return (
+            f'. With more than {_MOST_JOINTS_SEARCHED} joints the search samples: it pushed along '
+            f'{self.search.drives} drives, seed {self.options.seed}, which does not show that '
+            'there is no plan'
         )
 
     def _doubt(self) -> str:

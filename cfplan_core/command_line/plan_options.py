@@ -106,6 +106,13 @@ def wanted_plan(command: Command) -> Command:
             metavar="'X,Y X,Y X,Y...'",
             help='Keep the object inside this convex polygon: corners in m, counter-clockwise.',
         ),
+        click.option(
+            '--seed',
+            type=click.IntRange(min=0),
+            default=0,
+            metavar='N',
+            help='Draw from another generator, for hands of more than two joints.',
+        ),
     ]
     for option in reversed(options):
         command = option(command)

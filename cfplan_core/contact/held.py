@@ -16,9 +16,6 @@ class HeldSystem(ContactSystem):
 
     Contact formations have as many dimensions less as joints are held, so that what is a region
     of the whole system may be a curve here, and a curve a point.
-
-    Attributes:
-        whole: The system with all joints.
     """
 
     def __init__(self, whole: ContactSystem, held: Collection[str], z: FloatArray) -> None:
@@ -30,7 +27,7 @@ class HeldSystem(ContactSystem):
             z: Configuration of the whole system, shape (3 + n,): where they are held.
         """
         super().__init__(whole.problem)
-        self.whole = whole
+        self._whole = whole
         free = [k for k, name in enumerate(whole.joint_names) if name not in held]
         self._columns = np.array([0, 1, 2, *(3 + k for k in free)], dtype=np.intp)
         self._template = z.copy()
@@ -40,6 +37,11 @@ class HeldSystem(ContactSystem):
         self.lower, self.upper = whole.lower[free], whole.upper[free]
         self.moves = whole.moves[:, free]
         self.pair_moves = whole.pair_moves[:, free]
+
+    @property
+    def whole(self) -> ContactSystem:
+        """The system with all joints."""
+        return self._whole
 
     def reduced(self, z: FloatArray) -> FloatArray:
         """Leave out the held joints of a configuration of the whole system."""
@@ -53,14 +55,14 @@ class HeldSystem(ContactSystem):
 
     def configuration(self, grasp: Grasp) -> FloatArray:
         """Turn a grasp into z; the held joints' angles are not looked at."""
-        return self.reduced(self.whole.configuration(grasp))
+        return self.reduced(self._whole.configuration(grasp))
 
     def place(self, z: FloatArray) -> Placement:
         """World positions of all features, and of the axes of the joints that move."""
-        placed = self.whole.place(self.expanded(z))
+        placed = self._whole.place(self.expanded(z))
         return placed._replace(axes=placed.axes[:, self._columns[3:] - 3])
 
     def link_weight_torques(self, z: FloatArray) -> FloatArray:
         """Torques that hold the links' weight at the joints that move."""
-        torques = self.whole.link_weight_torques(self.expanded(z))
+        torques = self._whole.link_weight_torques(self.expanded(z))
         return np.asarray(torques[:, self._columns[3:] - 3])

@@ -163,6 +163,15 @@ class ContactSystem:
         self.pair_length = self.edge_length[self.pair_edge]
 
     @cached_property
+    def finger_joints(self) -> tuple[IntArray, ...]:
+        """Indices among `joint_names` of each finger's joints, but those that are held."""
+        index = {name: k for k, name in enumerate(self.joint_names)}
+        return tuple(
+            np.array([index[j.name] for j in f.joints if j.name in index], dtype=np.intp)
+            for f in self.problem.hand.fingers
+        )
+
+    @cached_property
     def _index_of_contact(self) -> dict[ElementalContact, int]:
         return {self.contact(k): k for k in range(self.contact_count)}
 
@@ -203,6 +212,11 @@ class ContactSystem:
         c, s = np.cos(phi), np.sin(phi)
         center = np.array([x + c * com[0] - s * com[1], y + s * com[0] + c * com[1]]) / self.size
         return np.concatenate([center, [phi], grasp.joints])
+
+    @property
+    def whole(self) -> ContactSystem:
+        """The system with all joints: itself."""
+        return self
 
     def reduced(self, z: FloatArray) -> FloatArray:
         """Leave out what is held of configurations of the whole system: nothing here."""

@@ -72,7 +72,7 @@ class Expedition:
         start: FloatArray,
         goal: FloatArray | GoalTest,
         grown: Callable[[int, int], None] = lambda initial, goal: None,
-        seed: int = 0,
+        seed: int | Sequence[int] = 0,
         most_drives: int = 20000,
     ) -> None:
         """Root the trees.
@@ -93,7 +93,8 @@ class Expedition:
         self.drives = 0
         self.meeting: int | None = None
         self._test = goal if isinstance(goal, GoalTest) else None
-        self._pusher = Pusher(roadmap.tracer, roadmap.failures, self._region_of)
+        refusal = roadmap.constraints.refusal
+        self._pusher = Pusher(roadmap.tracer, roadmap.failures, self._region_of, refusal)
         self._regrasping = Regrasping(
             self._system,
             roadmap.model,
@@ -291,12 +292,8 @@ class Expedition:
         return begin, ToConfiguration(wanted, weights, free), on_edges
 
     def _fingers(self) -> list[IntArray]:
-        """Columns of z of each finger's joints."""
-        found, first = [], 3
-        for finger in self._system.problem.hand.fingers:
-            found.append(np.arange(first, first + len(finger.joints)))
-            first += len(finger.joints)
-        return found
+        """Columns of z of each finger's joints; not of fingers all of whose joints are held."""
+        return [3 + joints for joints in self._system.finger_joints if len(joints)]
 
     def _nearest(self, growth: Growth, wanted: FloatArray, scale: FloatArray) -> Milestone:
         off = np.linalg.norm((growth.table - wanted) * scale, axis=1)
@@ -334,8 +331,12 @@ class Expedition:
         known.append(region)
         return region
 
-    def path(self) -> list[Leg]:
-        """Legs from start to goal; only after `run` returned true."""
+    def path(self, shorten: bool = True) -> list[Leg]:
+        """Legs from start to goal; only after `run` returned true.
+
+        Args:
+            shorten: False to leave detours as they are.
+        """
         assert self._met is not None
         initial = Growth.chain(self._met[0])
         stops: list[Stop] = [(initial[0], ())]
@@ -344,7 +345,8 @@ class Expedition:
             goal = Growth.chain(self._met[1])[::-1]
             for before, stop in pairwise(goal):
                 stops.append((stop, _backwards(before)))
-        pieces = [piece for _, motion in self._shortened(stops) for piece in motion]
+        stops = self._shortened(stops) if shorten else stops
+        pieces = [piece for _, motion in stops for piece in motion]
         return self._legs(pieces)
 
     def _shortened(self, stops: list[Stop]) -> list[Stop]:

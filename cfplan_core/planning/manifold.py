@@ -169,19 +169,31 @@ def settle(system: ContactSystem, z: FloatArray, pairs: IntArray) -> FloatArray:
         Shape (3 + n,), by Gauss-Newton steps of least norm. Joints that these would take beyond a
         limit stay at it where the contacts allow.
     """
-    settled = _settle(system, z, pairs, np.ones(system.dof, dtype=bool))
+    settled = settle_in(system, z, pairs, np.ones(system.dof, dtype=bool))
     clipped = settled.copy()
     clipped[3:] = np.clip(settled[3:], system.lower, system.upper)
     free = clipped == settled
     if free.all():
         return settled
-    held = _settle(system, clipped, pairs, free)
+    held = settle_in(system, clipped, pairs, free)
     off = np.abs(gaps(system, system.place(held[None]), pairs).gap).max()
     return held if off < _TOUCHING else settled
 
 
-def _settle(system: ContactSystem, z: FloatArray, pairs: IntArray, free: BoolArray) -> FloatArray:
-    """Gauss-Newton steps of least norm in the free coordinates."""
+def settle_in(
+    system: ContactSystem, z: FloatArray, pairs: IntArray, free: BoolArray
+) -> FloatArray:
+    """Move a configuration to where contacts touch, in some of its coordinates alone.
+
+    Args:
+        system: Compiled problem.
+        z: Shape (3 + n,).
+        pairs: Contacts, dependent or not, shape (k,).
+        free: Shape (3 + n,), true for the coordinates that may change.
+
+    Returns:
+        Shape (3 + n,), by Gauss-Newton steps of least norm.
+    """
     z = z.copy()
     for _ in range(_ITERATIONS):
         placed = system.place(z[None])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfplan_core.contact.gaps import gaps
-from cfplan_core.contact.system import ContactSystem
+from cfplan_core.contact.system import BoolArray, ContactSystem
 from cfplan_core.planning.drives import ToContact, held_still
 from cfplan_core.planning.milestones import Milestone
 
@@ -27,10 +27,9 @@ def placements(
         free.
     """
     count = system.contact_count
-    palm = 1 + len(system.problem.hand.palm)
     body = system.pair_body[:count]
-    touching = set(body[milestone.around.pairs].tolist())
-    free = np.array([b >= palm and b not in touching for b in range(len(system.body_names))])
+    free: BoolArray = np.asarray(system.moves.any(axis=1))
+    free[body[milestone.around.pairs]] = False
     gap, offset = (v[0] for v in gaps(system, system.place(milestone.z[None]), slice(0, count)))
     length = system.pair_length[:count]
     place = np.clip(offset, 0.05 * length, 0.95 * length)

@@ -14,18 +14,20 @@ import numpy as np
 
 from cfplan_core.contact.detection import touching
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.gaps import gap_gradients, gaps
+from cfplan_core.contact.gaps import gaps
+from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.branching import Branch, branches
 from cfplan_core.planning.drives import Drive
+from cfplan_core.planning.efforts import within_efforts
 from cfplan_core.planning.events import OPEN_EVENTS, EventKind
 from cfplan_core.planning.milestones import Milestone, Stretch
 from cfplan_core.planning.pieces import SAME, Region
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.steering import COMFORT, Helm
 from cfplan_core.planning.tracing import Trace, Tracer
-from cfplan_core.planning.transitions import surroundings
+from cfplan_core.planning.transitions import Surroundings, surroundings
 
 # Ways out of a configuration that are tried, the best first.
 _WAYS = 2
@@ -46,27 +48,34 @@ _PROGRESS = 0.01
 
 # Gives the region, known at a configuration or new, that a stretch leads into from there.
 Classifier = Callable[[list[Region], Formation, Stability], Region]
+# Says why contacts, shape (k,), of which some are together, shape (k, k), may not touch; or None.
+Refusal = Callable[[IntArray, BoolArray], 'str | None']
 
 
 class Pusher:
     """Pushes along drives, under one tracer."""
 
-    def __init__(self, tracer: Tracer, failures: Counter[str], region_of: Classifier) -> None:
+    def __init__(
+        self,
+        tracer: Tracer,
+        failures: Counter[str],
+        region_of: Classifier,
+        refusal: Refusal = lambda pairs, together: None,
+    ) -> None:
         """Prepare.
 
         Args:
             tracer: Follows motions.
             failures: Counts why ways out are not taken.
             region_of: Names the connected piece that a motion lies in.
+            refusal: Refuses configurations for what touches there.
         """
         self._tracer = tracer
         self._helm = Helm(tracer)
         self._failures = failures
         self._region_of = region_of
+        self._refusal = refusal
         self.attempts = 0
-        joints = tracer.system.problem.hand.joints
-        unit = tracer.system.force_unit * tracer.system.size
-        self._effort = np.array([joint.effort_limit for joint in joints]) / unit
 
     def push(
         self, begin: Milestone, drive: Drive, keep_on_edges: bool, most: int = _MOST_EVENTS
@@ -142,7 +151,9 @@ class Pusher:
         if np.abs(points[-1] - at.z).max() < SAME:
             self._failures[f'at once, {trace.kind.value}'] += 1
             return None
-        around = surroundings(self._tracer.system, points[-1])
+        points, around = self._allowed(points)
+        if around is None:
+            return None
         before, after = set(at.around.pairs.tolist()), set(around.pairs.tolist())
         extent = float(np.abs(points - at.z).max())
         for shortest, opened in ((_EXCURSION, before & after), (_HOP, before | after)):
@@ -158,6 +169,18 @@ class Pusher:
             stretches.append(Stretch(formation, stability, part, region))
             known = [region]
         return Milestone(points[-1], around, at, tuple(stretches), known)
+
+    def _allowed(self, points: FloatArray) -> tuple[FloatArray, Surroundings | None]:
+        """Points up to their end or, if that is refused, to some way before it."""
+        away = np.abs(points - points[-1]).max(axis=1)
+        for last in (len(points) - 1, int(np.argmax(away < _BESIDE)) - 1):
+            if last > 0:
+                around = surroundings(self._tracer.system, points[last])
+                refusal = self._refusal(around.pairs, around.together)
+                if refusal is None:
+                    return points[: last + 1], around
+                self._failures[refusal] += 1
+        return points, None
 
     def _comfortable(self, formation: Formation, points: FloatArray) -> FloatArray:
         """Points of a motion that ran out of stability up to where there was plenty left."""
@@ -195,11 +218,7 @@ class Pusher:
     def _strong(self, formation: Formation, points: FloatArray) -> FloatArray:
         """Points up to where a joint would exceed its effort limit."""
         system = self._tracer.system
-        weight = system.link_weight_torques(points)
-        gradients = gap_gradients(system, system.place(points), formation.array)
-        holds = self._tracer.model.holds_within(
-            gradients, -self._effort - weight, self._effort - weight
-        )
+        holds = within_efforts(system, self._tracer.model, formation, points)
         if holds.all():
             return points
         self._failures['a joint would exceed its effort limit'] += 1

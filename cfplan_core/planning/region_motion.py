@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cfplan_core.contact.detection import touching
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.planning.pieces import SAME, Region
+from cfplan_core.planning.connecting import projected_path
+from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.transitions import TOUCH
-
-_ARRIVED = 1e-9
 
 
 def straight_motion(
@@ -29,21 +26,12 @@ def straight_motion(
         Points from start to end, shape (s, 3 + n), inside the region between; None if the way
         ends before or leaves the region's stability class.
     """
-
-    def steer(z: FloatArray, basis: FloatArray) -> FloatArray | None:
-        ahead = np.asarray(basis.T @ (basis @ (end - z)))
-        return ahead if np.abs(ahead).max() > _ARRIVED else None
-
-    apart = float(np.abs(end - start).max())
-    if apart < SAME:
-        return None
     kept = set(region.formation.pairs)
     there = touching(roadmap.system, start, TOUCH).tolist()
     departing = frozenset(int(pair) for pair in there if pair not in kept)
-    trace = roadmap.tracer.follow(region.formation, start, steer, departing, longest=4.0 * apart)
-    if np.abs(trace.end - end).max() > SAME or len(trace.points) < 2:
+    points = projected_path(roadmap.tracer, region.formation, start, end, departing)
+    if points is None:
         return None
-    points = np.concatenate([trace.points[:-1], end[None]])
     parts = split_by_class(roadmap.tracer, region.formation, points)
     if len(parts) > 1 or parts[0][0] is not region.stability:
         return None

@@ -61,10 +61,7 @@ class Regrasping:
         self._touching: list[TouchingPostures] = []
         # Which finger each contact is of; -1 for the palm.
         self._finger_of = np.full(system.contact_count, -1, dtype=np.intp)
-        first = 0
-        for index, finger in enumerate(system.problem.hand.fingers):
-            joints = np.arange(first, first + len(finger.joints))
-            first += len(joints)
+        for index, joints in enumerate(joints for joints in system.finger_joints if len(joints)):
             moved = system.moves[system.pair_body[: system.contact_count]][:, joints].any(axis=1)
             self._finger_of[moved] = index
             self._motions.append(FreeMotion(system, joints))

@@ -12,7 +12,8 @@ from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
 from cfplan_core.planning.bounds import Bound
-from cfplan_core.planning.manifold import independent_rows, project
+from cfplan_core.planning.efforts import within_efforts
+from cfplan_core.planning.manifold import independent_rows, project, settle_in
 from cfplan_core.planning.search import Leg
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
@@ -46,15 +47,11 @@ class Frames:
 
 def overloaded_legs(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> list[int]:
     """Tell which legs no torques within the joints' effort limits can hold, by index."""
-    effort = np.array([joint.effort_limit for joint in system.problem.hand.joints])
-    effort = effort / (system.force_unit * system.size)
-    overloaded = []
-    for index, leg in enumerate(legs):
-        weight = system.link_weight_torques(leg.points)
-        gradients = gap_gradients(system, system.place(leg.points), leg.formation.array)
-        if not model.holds_within(gradients, -effort - weight, effort - weight).all():
-            overloaded.append(index)
-    return overloaded
+    return [
+        index
+        for index, leg in enumerate(legs)
+        if not within_efforts(system, model, leg.formation, leg.points).all()
+    ]
 
 
 def straying_legs(
@@ -160,6 +157,11 @@ def _parts(tracer: Tracer, leg: Leg, z: FloatArray) -> list[tuple[Stability, Flo
 def _middles(system: ContactSystem, leg: Leg, before: FloatArray, after: FloatArray) -> FloatArray:
     """Points of a formation's manifold half way between neighbours, each of shape (s, 3 + n)."""
     pairs = leg.formation.array
+    free = np.ptp(leg.points, axis=0) > 0.0
+    free[:3] = True
+    if not free.all():
+        # Joints that stand still do so between points, too.
+        return np.array([settle_in(system, z, pairs, free) for z in 0.5 * (before + after)])
     gradients = gap_gradients(system, system.place(before), pairs)
     rows = list(independent_rows(gradients[0]))
     basis = np.linalg.svd(gradients[:, rows])[2][:, len(rows) :]
