@@ -40,8 +40,14 @@ _JOINT = 0.1
 _TRIED = 0.15
 # Joined if a push ends this near to a configuration of the other tree.
 _MET = 1e-7
+# Drives after which the search begins anew with other luck, and how many more those are next time:
+# few searches take much longer than most.
+_PATIENCE = 400.0
+_GROWTH_OF_PATIENCE = 1.5
 # Poses of the object, in radians and object sizes, that count as the same.
 _SAME_POSE = 1e-8
+# Part of the drives to a pose that are to an angle alone.
+_TURNS = 0.5
 # Fingers are moved one by one where the object's poses differ by no more than this.
 _GAIT = 0.5
 # How much farther away a configuration counts for every body that touches in one only.
@@ -101,15 +107,20 @@ class Expedition:
             start if isinstance(goal, GoalTest) else goal,
             self._rng,
         )
-        roots = [start] if isinstance(goal, GoalTest) else [start, goal]
-        self._growths = [Growth() for _ in roots]
-        for growth, root in zip(self._growths, roots, strict=True):
-            milestone = Milestone(root, surroundings(self._system, root), None, ())
-            growth.add(milestone, self._bodies(milestone))
+        self._roots = [start] if isinstance(goal, GoalTest) else [start, goal]
+        self._growths: list[Growth] = []
+        self._begin()
         self._met: tuple[Milestone, Milestone] | None = None
         self._joining = Joining(roadmap.tracer, self._region_of, seed)
         self._scale = np.ones(self._system.dof)
         self._scale[3:] = _JOINT
+
+    def _begin(self) -> None:
+        """Begin with trees of one configuration."""
+        self._growths = [Growth() for _ in self._roots]
+        for growth, root in zip(self._growths, self._roots, strict=True):
+            milestone = Milestone(root, surroundings(self._system, root), None, ())
+            growth.add(milestone, self._bodies(milestone))
 
     @property
     def trees(self) -> tuple[Tree, Tree]:
@@ -136,7 +147,12 @@ class Expedition:
         if len(self._growths) > 1 and self._arrived(0, self._growths[0].milestones[0]):
             return True
         turn = 0
+        patience, restart = _PATIENCE, _PATIENCE
         while self._met is None and self.drives < self._most_drives:
+            if self.drives >= restart:
+                patience *= _GROWTH_OF_PATIENCE
+                restart = self.drives + patience
+                self._begin()
             side = turn % len(self._growths)
             turn += 1
             growth = self._growths[side]
@@ -282,8 +298,11 @@ class Expedition:
             roots = [growth.table[0] for growth in self._growths]
             between = roots[0] + rng.random() * (roots[-1] - roots[0])
             wanted[:3] = between[:3] + rng.normal(size=3) * [0.2, 0.2, 0.3]
-            begin = self._nearest(growth, wanted, _pose_weights(system.dof))
-            return begin, ToConfiguration(wanted, _pose_weights(system.dof), free), on_edges
+            weights = _pose_weights(system.dof)
+            if rng.random() < _TURNS:
+                weights[:2] = 0.0
+            begin = self._nearest(growth, wanted, weights)
+            return begin, ToConfiguration(wanted, weights, free), on_edges
         if kind < 0.8:
             drive = placements(system, begin, rng)
             if drive is not None:
