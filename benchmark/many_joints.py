@@ -1,8 +1,8 @@
 """How planning time grows with the joints of a hand: a table and a figure.
 
 `python benchmark/many_joints.py` from the project's folder plans every problem of
-config/problems/many_joints with several seeds, each time in a process of its own, prints a Markdown
-table and draws docs/many_joints.png; docs/many-joints.md has the outcome.
+config/problems/many_joints with several seeds, each time in a process of its own, prints a table
+in Markdown and draws docs/many_joints.png; docs/many-joints.md has the outcome.
 """
 
 from __future__ import annotations
