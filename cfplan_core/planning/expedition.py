@@ -23,6 +23,7 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.drives import Drive, ToConfiguration
 from cfplan_core.planning.goal_test import GoalTest
+from cfplan_core.planning.joining import Joining, SamePieces
 from cfplan_core.planning.milestones import Growth, Milestone, Stretch
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.placing import placements
@@ -95,7 +96,6 @@ class Expedition:
         self._rng = np.random.default_rng(seed)
         self._most_drives = most_drives
         self.drives = 0
-        self.meeting: int | None = None
         self._test = goal if isinstance(goal, GoalTest) else None
         refusal = roadmap.constraints.refusal
         self._pusher = Pusher(roadmap.tracer, roadmap.failures, self._region_of, refusal)
@@ -111,6 +111,7 @@ class Expedition:
         self._growths: list[Growth] = []
         self._begin()
         self._met: tuple[Milestone, Milestone] | None = None
+        self._joining = Joining(roadmap.tracer, self._region_of, seed)
         self._scale = np.ones(self._system.dof)
         self._scale[3:] = _JOINT
 
@@ -124,14 +125,22 @@ class Expedition:
     @property
     def trees(self) -> tuple[Tree, Tree]:
         """The CF-trees, for pictures and statistics."""
-        trees = [_cf_tree(growth) for growth in self._growths]
+        same = self._joining.same
+        trees = [_cf_tree(growth, same) for growth in self._growths]
         if len(trees) < 2:
             trees.append(Tree(trees[0].root))
-        if self._met is not None:
-            last = self._met[0].stretches[-1].region if self._met[0].stretches else None
-            if last is not None and last.index not in trees[1].index_of:
+        if self._met is not None and self.meeting is not None:
+            last = self._roadmap.pieces[self.meeting]
+            if last.index not in trees[1].index_of:
                 trees[1].add(Node(last, 0 if trees[1].nodes else None, self._met[0].z, 1))
         return trees[0], trees[1]
+
+    @property
+    def meeting(self) -> int | None:
+        """See the class; a piece that the initial tree reached last."""
+        if self._met is None or not self._met[0].stretches:
+            return None
+        return self._joining.same.of(self._met[0].stretches[-1].region).index
 
     def run(self) -> bool:
         """Grow until the trees meet (true) or the drives are used up (false)."""
@@ -169,6 +178,7 @@ class Expedition:
         counts[side] += 1
         self._grown(counts[0], counts[1])
         self._growths[side].add(reached, self._bodies(reached))
+        self._joining.add(side, reached)
 
     def _bodies(self, milestone: Milestone) -> tuple[int, ...]:
         """Bodies of the hand that touch the object."""
@@ -184,9 +194,14 @@ class Expedition:
         other = self._growths[1 - side]
         off = np.abs(other.table - reached.z).max(axis=1)
         nearest = int(np.argmin(off))
-        if off[nearest] > _MET:
-            return False
-        pair = (reached, other.milestones[nearest])
+        if off[nearest] <= _MET:
+            pair = (reached, other.milestones[nearest])
+        else:
+            joined = self._joining.join(side, reached)
+            if joined is None:
+                return False
+            self._add(side, joined[0])
+            pair = joined
         self._met = pair if side == 0 else (pair[1], pair[0])
         return True
 
@@ -438,20 +453,23 @@ def _length(stops: Sequence[Stop]) -> float:
     )
 
 
-def _cf_tree(growth: Growth) -> Tree:
+def _cf_tree(growth: Growth, same: SamePieces) -> Tree:
     """Regions of a tree in the order of discovery, each below that it was entered from."""
     root = growth.milestones[0]
     tree = Tree(root.z)
     for milestone in growth.milestones[1:]:
         assert milestone.parent is not None
-        above = milestone.parent.stretches[-1].region.index if milestone.parent.stretches else None
+        above = (
+            same.of(milestone.parent.stretches[-1].region) if milestone.parent.stretches else None
+        )
         for stretch in milestone.stretches:
-            if stretch.region.index not in tree.index_of:
-                parent = tree.index_of.get(above) if above is not None else None
+            region = same.of(stretch.region)
+            if region.index not in tree.index_of:
+                parent = tree.index_of.get(above.index) if above is not None else None
                 if parent is None and tree.nodes:
                     parent = 0
                 depth = 0 if parent is None else tree.nodes[parent].depth + 1
                 entry = None if parent is None else stretch.points[0]
-                tree.add(Node(stretch.region, parent, entry, depth))
-            above = stretch.region.index
+                tree.add(Node(region, parent, entry, depth))
+            above = region
     return tree
