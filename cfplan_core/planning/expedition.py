@@ -108,15 +108,16 @@ class Expedition:
             self._rng,
         )
         self._roots = [start] if isinstance(goal, GoalTest) else [start, goal]
+        self._seed = seed
         self._growths: list[Growth] = []
         self._begin()
         self._met: tuple[Milestone, Milestone] | None = None
-        self._joining = Joining(roadmap.tracer, self._region_of, seed)
         self._scale = np.ones(self._system.dof)
         self._scale[3:] = _JOINT
 
     def _begin(self) -> None:
         """Begin with trees of one configuration."""
+        self._joining = Joining(self._roadmap.tracer, self._region_of, self._seed)
         self._growths = [Growth() for _ in self._roots]
         for growth, root in zip(self._growths, self._roots, strict=True):
             milestone = Milestone(root, surroundings(self._system, root), None, ())
