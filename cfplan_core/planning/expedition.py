@@ -22,6 +22,8 @@ from cfplan_core.contact.system import IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.drives import Drive, ToConfiguration
+from cfplan_core.planning.force_drive import ToForce
+from cfplan_core.planning.goal_drives import contact_drive
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.joining import Joining, SamePieces
 from cfplan_core.planning.milestones import Growth, Milestone, Stretch
@@ -292,6 +294,10 @@ class Expedition:
                 weights = np.zeros(system.dof)
                 weights[self._test.columns] = 1.0
                 begin = self._nearest(growth, wanted, weights * self._scale)
+                if kind < 0.25 or not len(self._test.columns):
+                    contact = contact_drive(system, self._test, begin, rng)
+                    if contact is not None:
+                        return begin, contact, True
                 return begin, ToConfiguration(wanted, weights, free), on_edges
             return begin, ToConfiguration(wanted, _pose_weights(system.dof), free), on_edges
         begin = self._promising(side)
@@ -309,6 +315,8 @@ class Expedition:
             drive = placements(system, begin, rng)
             if drive is not None:
                 return begin, drive, True
+            if len(begin.around.pairs) > 2:
+                return begin, self._unloading(begin), True
         wanted = begin.z.copy()
         fingers = self._fingers()
         columns = fingers[int(rng.integers(len(fingers)))]
@@ -321,6 +329,13 @@ class Expedition:
         if rng.random() < 0.5:
             weights[:3] = 1.0
         return begin, ToConfiguration(wanted, weights, free), on_edges
+
+    def _unloading(self, begin: Milestone) -> ToForce:
+        """Draw a contact that touches, to be let go, from one where no link is free to touch."""
+        pairs = tuple(int(pair) for pair in begin.around.pairs)
+        pair = pairs[int(self._rng.integers(len(pairs)))]
+        system, model = self._system, self._roadmap.model
+        return ToForce(system, model, system.load, Formation(pairs), pair)
 
     def _fingers(self) -> list[IntArray]:
         """Columns of z of each finger's joints; not of fingers all of whose joints are held."""

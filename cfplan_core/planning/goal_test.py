@@ -85,6 +85,10 @@ class GoalTest:
         """Tell whether the contacts wanted are among pairs, shape (k,)."""
         return self._pairs <= set(pairs.tolist())
 
+    def missing(self, pairs: IntArray) -> list[int]:
+        """List the contacts wanted that are not among pairs, shape (k,)."""
+        return sorted(self._pairs - set(pairs.tolist()))
+
     def fits(self, z: FloatArray) -> bool:
         """Tell whether a configuration has the coordinates wanted, within their tolerances."""
         return bool((np.abs(z[self.columns] - self.wanted) <= self._tolerance).all())
