@@ -1,8 +1,8 @@
 """How planning time grows with the joints of a hand: a table and a figure.
 
 `python benchmark/many_joints.py` from the project's folder plans every problem of
-config/problems/many_joints with several seeds, each time in a process of its own, prints a Markdown
-table and draws docs/many_joints.png; docs/many-joints.md has the outcome.
+config/problems/many_joints with several seeds, each time in a process of its own, prints a table
+in Markdown and draws docs/many_joints.png; docs/many-joints.md has the outcome.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def main() -> None:
     """Plan, print the table and draw the figure."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--seeds', type=int, default=5, help='searches of each problem')
-    parser.add_argument('--time-budget', type=float, default=120.0, help='seconds of each search')
+    parser.add_argument('--time-budget', type=float, default=600.0, help='seconds of each search')
     parser.add_argument('--figure', type=Path, default=ROOT / 'docs' / 'many_joints.png')
     options = parser.parse_args()
     print('| problem | joints | solved | median, s | longest, s | memory, MB | segments |')

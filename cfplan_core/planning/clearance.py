@@ -46,13 +46,13 @@ class Clearance:
         edge_body = system.body_of[system.pair_edge]
         concerned = (system.pair_moves[:, joints] != 0.0).any(axis=1)
         concerned &= _outer_edges(system)[system.pair_edge]
-        moved = system.moves[:, joints].any(axis=1)
+        moved: BoolArray = np.asarray(system.moves[:, joints].any(axis=1))
         if other is not None:
-            seconds = system.moves[:, other].any(axis=1)
+            seconds: BoolArray = np.asarray(system.moves[:, other].any(axis=1))
             concerned &= (moved | seconds)[vertex_body] & (moved | seconds)[edge_body]
             concerned &= seconds[vertex_body] | seconds[edge_body]
         if alone:
-            strange = system.moves.any(axis=1) & ~moved
+            strange: BoolArray = np.asarray(system.moves.any(axis=1) & ~moved)
             concerned &= ~(strange[vertex_body] | strange[edge_body])
         chosen = np.flatnonzero(concerned)
         low = np.minimum(vertex_body, edge_body)[chosen]

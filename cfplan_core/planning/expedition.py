@@ -42,9 +42,9 @@ _JOINT = 0.1
 _TRIED = 0.15
 # Joined if a push ends this near to a configuration of the other tree.
 _MET = 1e-7
-# Drives after which the search begins anew with other luck, and how many more those are next time:
-# few searches take much longer than most.
-_PATIENCE = 400.0
+# Drives, for each joint, after which the search begins anew with other luck, and how many more
+# those are next time: few searches take much longer than most.
+_PATIENCE = 60.0
 _GROWTH_OF_PATIENCE = 1.5
 # Poses of the object, in radians and object sizes, that count as the same.
 _SAME_POSE = 1e-8
@@ -110,15 +110,16 @@ class Expedition:
             self._rng,
         )
         self._roots = [start] if isinstance(goal, GoalTest) else [start, goal]
+        self._seed = seed
         self._growths: list[Growth] = []
         self._begin()
         self._met: tuple[Milestone, Milestone] | None = None
-        self._joining = Joining(roadmap.tracer, self._region_of, seed)
         self._scale = np.ones(self._system.dof)
         self._scale[3:] = _JOINT
 
     def _begin(self) -> None:
         """Begin with trees of one configuration."""
+        self._joining = Joining(self._roadmap.tracer, self._region_of, self._seed)
         self._growths = [Growth() for _ in self._roots]
         for growth, root in zip(self._growths, self._roots, strict=True):
             milestone = Milestone(root, surroundings(self._system, root), None, ())
@@ -149,7 +150,8 @@ class Expedition:
         if len(self._growths) > 1 and self._arrived(0, self._growths[0].milestones[0]):
             return True
         turn = 0
-        patience, restart = _PATIENCE, _PATIENCE
+        patience = _PATIENCE * self._system.joint_count
+        restart = patience
         while self._met is None and self.drives < self._most_drives:
             if self.drives >= restart:
                 patience *= _GROWTH_OF_PATIENCE

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfplan_core.contact.system import ContactSystem, IntArray
+from cfplan_core.contact.system import BoolArray, ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.clearance import Clearance
 
@@ -38,7 +38,7 @@ def parked_postures(
         Angles of the finger's joints, shape (c, j), c ≤ count, those farthest away first.
     """
     clearance = Clearance(system, joints)
-    moved = system.moves[:, joints].any(axis=1)
+    moved: BoolArray = np.asarray(system.moves[:, joints].any(axis=1))
     last = 1 + len(system.problem.hand.palm)
     # Other fingers stand where they stand: the object and the palm alone count.
     fixed = ~moved & (np.arange(len(moved)) < last)
