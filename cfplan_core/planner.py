@@ -145,7 +145,7 @@ class _Planning:
             return self._answer(Status.INFEASIBLE, f'no path: {impossible}')
         try:
             if self.moving.joint_count > _MOST_JOINTS_SEARCHED and not _held_by_two(examined):
-                return self._search_samples(start, goals[-1])
+                return self._search_samples(start, goals[0])
             if self.options.optimal:
                 exact = self.options.alternatives == 1 and self.moving.joint_count <= MOST_JOINTS
                 search = self._search_all if exact else self._search_best
