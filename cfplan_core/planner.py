@@ -41,7 +41,7 @@ from cfplan_core.trajectory.inspection import flaw
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
 
 # Hands of which more joints move are planned for by drives rather than piece by piece.
-_MOST_JOINTS_SEARCHED = 2
+MOST_JOINTS = 2
 # So many searches are made for each plan wanted where plans are compared and no budget is given.
 _SEARCHES = 6
 
@@ -144,7 +144,7 @@ class _Planning:
         if impossible:
             return self._answer(Status.INFEASIBLE, f'no path: {impossible}')
         try:
-            if self.moving.joint_count > _MOST_JOINTS_SEARCHED and not _held_by_two(examined):
+            if self.moving.joint_count > MOST_JOINTS and not _held_by_two(examined):
                 return self._search_samples(start, goals[0])
             if self.options.optimal:
                 exact = self.options.alternatives == 1 and self.moving.joint_count <= MOST_JOINTS
@@ -166,6 +166,9 @@ class _Planning:
         if legs is None:
             nearest = goals[-1].how_near() if isinstance(goals[-1], GoalTest) else ''
             message = f'no path{nearest}; {self._explored()}{self._doubt()}'
+            if self.moving.joint_count > MOST_JOINTS:
+                message += '. Rays do not show that there is no plan'
+                return self._answer(Status.BUDGET_EXHAUSTED, message)
             return self._answer(Status.INFEASIBLE, message)
         return self._solved(legs, '')
 
@@ -467,7 +470,7 @@ class _Planning:
         if not isinstance(self.search, SampledSearch):
             return ''
         return (
-            f'. With more than {_MOST_JOINTS_SEARCHED} joints the search samples: it pushed along '
+            f'. With more than {MOST_JOINTS} joints the search samples: it pushed along '
             f'{self.search.drives} drives, seed {self.options.seed}, which does not show that '
             'there is no plan'
         )
