@@ -40,8 +40,6 @@ from cfplan_core.trajectory.frames import build_frames, overloaded_legs, strayin
 from cfplan_core.trajectory.inspection import flaw
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
 
-# Hands of which more joints move are planned for by drives rather than piece by piece.
-MOST_JOINTS = 2
 # So many searches are made for each plan wanted where plans are compared and no budget is given.
 _SEARCHES = 6
 
@@ -63,7 +61,7 @@ class Progress:
     message: str
 
 
-# Hands that everything is explored for.
+# With more joints the search samples; with up to so many it is complete.
 MOST_JOINTS = 2
 TOO_WEAK = 'a joint would exceed its effort limit'
 
