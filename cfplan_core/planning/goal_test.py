@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfplan_core.contact.system import ContactSystem
+from cfplan_core.contact.system import ContactSystem, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Goal
 from cfplan_core.planning.goal_curves import CurveGoal
