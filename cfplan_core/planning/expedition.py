@@ -108,6 +108,7 @@ class Expedition:
             start,
             start if isinstance(goal, GoalTest) else goal,
             self._rng,
+            roadmap.tracer.checkpoint,
         )
         self._roots = [start] if isinstance(goal, GoalTest) else [start, goal]
         self._seed = seed
