@@ -120,19 +120,23 @@ def _draw(runs: dict[str, list[Run]], path: Path) -> None:
     axes.plot(line, scale * line**exponent, '-', color='C0', label=f'fit: $n^{{{exponent:.1f}}}$')
     middle = np.exp(np.log(medians / joints**2.0).mean())
     axes.plot(line, middle * line**2.0, ':', color='0.3', label='$n^2$')
+    labelled: set[int] = set()
     for name, of in runs.items():
+        side = 1 if of[0].joints in labelled else -1
+        labelled.add(of[0].joints)
         axes.annotate(
-            name.replace('_', ' '),
-            (of[0].joints, min(run.seconds for run in of)),
-            xytext=(0, -11),
+            name.replace('_', ' ').replace('fingers ', 'fingers\n'),
+            (of[0].joints, statistics.median(run.seconds for run in of)),
+            xytext=(8 * side, 0),
             textcoords='offset points',
-            ha='center',
+            ha='left' if side > 0 else 'right',
+            va='center',
             fontsize=7,
         )
     axes.set(xscale='log', yscale='log', xlabel='joints', ylabel='planning time, s')
     axes.set_xticks(sorted(set(joints.tolist())), [str(n) for n in sorted(set(joints.tolist()))])
     axes.minorticks_off()
-    axes.margins(y=0.15)
+    axes.margins(x=0.15, y=0.15)
     axes.legend(frameon=False, loc='upper left')
     figure.savefig(path, dpi=150)
 

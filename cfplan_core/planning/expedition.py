@@ -43,7 +43,7 @@ _TRIED = 0.15
 # Joined if a push ends this near to a configuration of the other tree.
 _MET = 1e-7
 # Drives, for each joint, after which the search begins anew with other luck, and how many more
-# those are next time: few searches take much longer than most.
+# those are next time.
 _PATIENCE = 60.0
 _GROWTH_OF_PATIENCE = 1.5
 # Poses of the object, in radians and object sizes, that count as the same.
@@ -108,6 +108,7 @@ class Expedition:
             start,
             start if isinstance(goal, GoalTest) else goal,
             self._rng,
+            roadmap.tracer.checkpoint,
         )
         self._roots = [start] if isinstance(goal, GoalTest) else [start, goal]
         self._seed = seed
