@@ -200,6 +200,17 @@ def test_part_of_a_goal_that_can_be_reached_is_reached(seed: int, parts: set[str
     solved(replace(problem, goal=Goal(**{part: known[part] for part in parts})))
 
 
+def test_alternatives_do_not_end_a_hair_beside_another_contact() -> None:
+    """The start lies flush on the palm, as wanted; regions begin beside it."""
+    problem = random_problem(1)
+    goal = Goal(orientation=0.0, tolerance=Tolerance(angle=0.02))
+    problem = replace(problem, goal=goal)
+    result = solved(problem, PlanOptions(prefer='shortest', alternatives=3))
+    assert len(result.alternatives) == 2
+    for other in result.alternatives:
+        assert verify_plan(problem, other).failures == ()
+
+
 @pytest.mark.parametrize('seed', [1, 16])
 def test_orientation_on_any_sheet_is_reached_in_its_contact_formation(seed: int) -> None:
     """The formations of three contacts have two dimensions: a level set of the angle."""

@@ -146,6 +146,10 @@ class GoalTest:
         """Tell whether contacts that touch are those wanted."""
         return self.region.holds(pairs)
 
+    def missing(self, pairs: IntArray) -> list[int]:
+        """List the contacts wanted that are not among pairs, shape (k,)."""
+        return sorted(self.region.pairs - set(pairs.tolist()))
+
     def fits(self, z: FloatArray) -> bool:
         """Tell whether a configuration has the coordinates wanted, within their tolerances."""
         return self.region.fits(z)
