@@ -53,6 +53,7 @@ setup(
         'rich>=13.0',
         'scipy>=1.11',
         'shapely>=2.0',
+        'toppra>=0.6.10',
     ],
     extras_require={
         'test': [

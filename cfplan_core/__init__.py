@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from cfplan_core.model.loading import load_problem as load_problem
     from cfplan_core.options import PlanOptions as PlanOptions
     from cfplan_core.options import Preference as Preference
+    from cfplan_core.options import TrajectoryOptions as TrajectoryOptions
     from cfplan_core.planner import Progress as Progress
     from cfplan_core.planner import plan as plan
     from cfplan_core.trajectory.plan_file import read_plan as read_plan
@@ -60,7 +61,7 @@ _HOMES = {
         'Tolerance',
     ),
     'model.loading': ('load_problem',),
-    'options': ('PlanOptions', 'Preference'),
+    'options': ('PlanOptions', 'Preference', 'TrajectoryOptions'),
     'planner': ('Progress', 'plan'),
     'trajectory.plan_file': ('read_plan', 'write_plan'),
     'trajectory.plan_margin': ('plan_margin',),

@@ -15,6 +15,16 @@ RESOLUTION = 0.05
 """Spacing of the grid of joint angles that regions are filled over unless asked otherwise, rad."""
 
 
+ACCELERATION = 10.0
+"""Acceleration limit of joints for which the problem states none, rad/s²."""
+
+INERTIA = 0.05
+"""Share of the weight that inertial forces may have unless asked otherwise."""
+
+SQUEEZE = 5.0
+"""Largest contact force of nominal torques unless asked otherwise, weights of the object."""
+
+
 class Preference(str, Enum):
     """Which of several plans is the best; `docs/optimality.md` says how each is measured."""
 
@@ -22,6 +32,38 @@ class Preference(str, Enum):
     FEWEST_SEGMENTS = 'fewest-segments'
     SHORTEST = 'shortest'
     ROBUST = 'robust'
+
+
+@dataclass(frozen=True)
+class TrajectoryOptions:
+    """How a path becomes a trajectory.
+
+    Attributes:
+        squeeze: Largest contact force, in weights of the object, that the nominal torques press
+            with where that is a choice: in form closure they could press ever harder. Where the
+            contacts need more than two thirds of it, half as much again as they need.
+        inertia: Largest inertial force of the object, and of each link with mass, as a share of
+            its weight, and likewise the largest inertial moment as a share of weight times size.
+        event_distance: How near to a contact event, along the joints' path, motion is slow, rad.
+        event_speed: Share of the velocity limits that joints may use there.
+    """
+
+    squeeze: float = SQUEEZE
+    inertia: float = INERTIA
+    event_distance: float = 0.05
+    event_speed: float = 0.25
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.inertia) and self.inertia > 0.0):
+            raise CfplanError(f'inertia: got {self.inertia}, expected a share above zero')
+        if not (math.isfinite(self.event_distance) and self.event_distance >= 0.0):
+            raise CfplanError(
+                f'event_distance: got {self.event_distance}, expected rad, not negative'
+            )
+        if not 0.0 < self.event_speed <= 1.0:
+            raise CfplanError(f'event_speed: got {self.event_speed}, expected above 0, at most 1')
+        if not (math.isfinite(self.squeeze) and self.squeeze > 0.0):
+            raise CfplanError(f'squeeze: got {self.squeeze}, expected weights above zero')
 
 
 @dataclass(frozen=True)
@@ -48,6 +90,7 @@ class PlanOptions:
         prefer: Which plan to choose; unless it is the first one found, the search goes on until no
             better one can exist or a budget is exhausted.
         alternatives: Number of plans wanted, with different sequences of contact formations.
+        trajectory: How the path becomes a trajectory.
         seed: Of the generator that searches of hands with more than two joints draw from; the
             same seed gives the same plan.
     """
@@ -64,6 +107,7 @@ class PlanOptions:
     second_order: bool = True
     prefer: Preference = Preference.FIRST
     alternatives: int = 1
+    trajectory: TrajectoryOptions = TrajectoryOptions()
     seed: int = 0
 
     @property

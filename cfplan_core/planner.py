@@ -205,7 +205,7 @@ class _Planning:
 
     def _solved(self, legs: Sequence[Leg], message: str) -> PlanResult:
         """The answer for a path, with the trees of the search that found it."""
-        frames = build_frames(self.system, self.model, self._whole(legs))
+        frames = build_frames(self.system, self.model, self._whole(legs), self.options.trajectory)
         return replace(
             self._answer(Status.SOLVED, message),
             times=frames.times,
@@ -217,6 +217,8 @@ class _Planning:
             reversible=self.model.reversible,
             entry_lower=frames.entry_lower,
             entry_upper=frames.entry_upper,
+            torque_nominal=frames.torque_nominal,
+            entry_nominal=frames.entry_nominal,
         )
 
     @property

@@ -24,6 +24,7 @@ from cfplan_core.command_line.console import (
 from cfplan_core.command_line.inputs import Examined, examine
 from cfplan_core.command_line.plan_options import wanted_plan
 from cfplan_core.command_line.progress import progress_bar
+from cfplan_core.command_line.trajectory_options import timed_plan, trajectory_options
 from cfplan_core.errors import CfplanError, InvalidProblemError
 from cfplan_core.model import Problem
 from cfplan_core.trajectory.plan_result import PlanResult, Status
@@ -81,6 +82,7 @@ def finite_seconds(
     help='Give up once the two trees have N nodes or more together.',
 )
 @wanted_plan
+@timed_plan
 def plan(
     file: Path,
     json_path: Path | None,
@@ -101,7 +103,10 @@ def plan(
             directory.mkdir(parents=True, exist_ok=True)
 
     try:
-        options = PlanOptions(time_budget=time_budget, max_nodes=max_nodes, **wanted)
+        trajectory = trajectory_options(wanted)
+        options = PlanOptions(
+            time_budget=time_budget, max_nodes=max_nodes, trajectory=trajectory, **wanted
+        )
     except CfplanError as error:
         complain(str(error))
         return INVALID_INPUT

@@ -20,8 +20,14 @@ REFUTED = 1
 @click.command(short_help='Certify a plan by a second method.')
 @click.argument('problem_path', metavar='PROBLEM', type=click.Path(path_type=Path))
 @click.argument('plan_path', metavar='PLAN', type=click.Path(path_type=Path))
+@click.option(
+    '--inertia',
+    type=float,
+    metavar='SHARE',
+    help='Inertial forces may be up to this share of the weight; 0.05 unless given.',
+)
 @click.option('-v', '--verbose', is_flag=True, help='List every check, also those that pass.')
-def verify(problem_path: Path, plan_path: Path, verbose: bool) -> int:
+def verify(problem_path: Path, plan_path: Path, inertia: float | None, verbose: bool) -> int:
     """Certify, frame by frame, that the file PLAN solves the file PROBLEM.
 
     Shares no code with the planner's mechanics. Lists the checks that fail, and what is wrong in
@@ -30,10 +36,13 @@ def verify(problem_path: Path, plan_path: Path, verbose: bool) -> int:
     Exit status: 0 certified, 1 not, 2 invalid input or usage.
     """
     from cfplan_core.model.loading import load_problem
+    from cfplan_core.options import TrajectoryOptions
     from cfplan_core.trajectory.plan_file import read_plan
     from cfplan_core.verification import verify_plan
 
-    report = verify_plan(load_problem(problem_path), read_plan(plan_path))
+    options = TrajectoryOptions() if inertia is None else TrajectoryOptions(inertia=inertia)
+    problem, plan = load_problem(problem_path), read_plan(plan_path)
+    report = verify_plan(problem, plan, options.inertia)
     console = answers()
     shown = [check for check in report.checks if verbose or not check.ok]
     if shown:

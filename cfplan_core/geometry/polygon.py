@@ -48,6 +48,20 @@ def centroid(vertices: FloatArray) -> FloatArray:
     return np.asarray(origin + (p + q).T @ cross / (3.0 * cross.sum()))
 
 
+def second_moment(vertices: FloatArray, about: FloatArray) -> float:
+    """Mean squared distance of a polygon's area from a point, m².
+
+    Args:
+        vertices: Shape (n, 2), m; the area may not be zero.
+        about: Shape (2,), m.
+    """
+    p = vertices - about
+    q = np.roll(p, -1, axis=0)
+    cross = p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1]
+    squares = (p * p + p * q + q * q).sum(axis=1)
+    return float(squares @ cross / (6.0 * cross.sum()))
+
+
 def diameter(vertices: FloatArray) -> float:
     """Largest distance between two vertices, m: the length by which tests are scaled."""
     n = len(vertices)

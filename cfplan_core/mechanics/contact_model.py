@@ -7,11 +7,13 @@ configurations, whose first three columns are the wrench directions wᵀ and who
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple, Protocol
 
 from cfplan_core.contact.system import BoolArray
 from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.control_roles import Roles
 
 
 class Stability(str, Enum):
@@ -57,6 +59,33 @@ class Motion(NamedTuple):
     unique: bool
 
 
+class Holding(NamedTuple):
+    """A stretch of motion inside one contact formation, to be held by actuators.
+
+    Attributes:
+        gradients: Shape (s, k, 3 + n).
+        lower: Shape (s, n), smallest torques that are possible, without the links' weight.
+        upper: Shape (s, n), largest ones.
+    """
+
+    gradients: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+
+
+class Actuation(NamedTuple):
+    """How actuators hold the object along a stretch.
+
+    Attributes:
+        torques: Shape (s, n), in the middle of those that keep all contacts, without the links'
+            weight.
+        roles: Which joints to control in torque, the best choice first.
+    """
+
+    torques: FloatArray
+    roles: tuple[Roles, ...]
+
+
 class ContactModel(Protocol):
     """What the planner needs to know of mechanics."""
 
@@ -93,6 +122,12 @@ class ContactModel(Protocol):
         """Tell where torques between limits, each of shape (s, n), keep all contacts; shape (s,).
 
         Unlike `torque_limits` this asks for all joints at once.
+        """
+
+    def actuation(self, stretches: Sequence[Holding], squeeze: float) -> tuple[Actuation, ...]:
+        """Say how actuators should hold stretches of motion, each inside one contact formation.
+
+        With contact forces of at most `squeeze` weights where the contacts leave a choice.
         """
 
     def needed_forces(self, gradients: FloatArray) -> FloatArray:

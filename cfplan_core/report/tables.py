@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from rich import box
 from rich.console import Console, Group, RenderableType
@@ -10,7 +12,8 @@ from rich.text import Text
 
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Problem
-from cfplan_core.trajectory.plan_result import PlanResult
+from cfplan_core.trajectory.plan_result import PlanResult, Segment
+from cfplan_core.trajectory.segment_ends import SegmentEnd, segment_ends
 
 MOST_FAILURES = 10
 
@@ -76,16 +79,22 @@ def _titled(title: str, table: Table) -> Group:
 def _segment_table(result: PlanResult) -> Table:
     table = _new_table()
     table.add_column('No.', justify='right')
-    table.add_column('Contacts', overflow='fold')
-    table.add_column('Stability,\nneeded force')
+    table.add_column('Contacts; at the end\n- broken and + made', overflow='fold')
+    planned = any(segment.control is not None for segment in result.segments)
+    heading = 'Stability,\nneeded force' + (',\nby torque' if planned else '')
+    table.add_column(heading, overflow='fold')
     table.add_column('Frames', justify='right')
     table.add_column('Time (s)', justify='right')
-    for k, segment in enumerate(result.segments):
+    for k, (segment, ending) in enumerate(
+        zip(result.segments, segment_ends(result.segments), strict=True)
+    ):
         start, end = result.times[segment.first_frame], result.times[segment.last_frame]
         table.add_row(
             str(k + 1),
-            Text('\n'.join(segment.contacts)),
-            segment.stability.replace('_', ' ') + _needed(segment.needed_force),
+            Text('\n'.join(_contacts(segment, ending))),
+            segment.stability.replace('_', ' ')
+            + _needed(segment.needed_force)
+            + _torque_controlled(segment.control),
             f'{segment.first_frame} to {segment.last_frame}',
             f'{start:.2f} to {end:.2f}\n({end - start:.2f})',
             end_section=True,
@@ -116,6 +125,19 @@ def _needed(force: float | None) -> str:
     return '' if force is None else f'\n{force:.2f} weights'
 
 
+def _contacts(segment: Segment, end: SegmentEnd) -> list[str]:
+    """Contacts of a segment, then those that break and those that are made at its end."""
+    broken = [f'- {name}' for name in end.broken]
+    return [*segment.contacts, *broken, *[f'+ {name}' for name in end.made]]
+
+
+def _torque_controlled(control: Mapping[str, str] | None) -> str:
+    if control is None:
+        return ''
+    names = [name for name, role in control.items() if role == 'effort']
+    return '\n' + (', '.join(names) or 'none')
+
+
 def _joint_table(result: PlanResult, problem: Problem | None) -> Table:
     table = _new_table()
     table.add_column('Joint', overflow='fold')
@@ -136,7 +158,9 @@ def _joint_table(result: PlanResult, problem: Problem | None) -> Table:
 def _torque_table(result: PlanResult) -> Table:
     table = _new_table()
     table.add_column('Joint', overflow='fold')
-    for name in ('Range of lower limit', 'Range of upper limit', 'Narrowest interval'):
+    nominal = len(result.torque_nominal) > 0
+    columns = ['Range of lower limit', 'Range of upper limit', 'Narrowest interval']
+    for name in columns + ['Range of nominal torque'] * nominal:
         table.add_column(name, justify='right')
     for k, name in enumerate(result.joint_names):
         lower, upper = result.torque_lower[:, k], result.torque_upper[:, k]
@@ -146,6 +170,7 @@ def _torque_table(result: PlanResult) -> Table:
             _range(lower),
             _range(upper),
             f'{_torque(lower[narrowest])} to {_torque(upper[narrowest])}\nin frame {narrowest}',
+            *([_range(result.torque_nominal[:, k])] if nominal else []),
         )
     return table
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cfplan_core.contact.gaps import gap_gradients
-from cfplan_core.contact.system import ContactSystem
+from cfplan_core.contact.system import BoolArray, ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import ContactModel, Stability
+from cfplan_core.options import ACCELERATION, TrajectoryOptions
 from cfplan_core.planning.bounds import Bound
 from cfplan_core.planning.efforts import within_efforts
 from cfplan_core.planning.equations import equation_gradients, formation_rows
@@ -18,8 +19,11 @@ from cfplan_core.planning.manifold import formation_equations, project, settle_i
 from cfplan_core.planning.search import Leg
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
+from cfplan_core.trajectory.inertia import moving_masses
 from cfplan_core.trajectory.plan_result import Segment
-from cfplan_core.trajectory.timing import frame_times
+from cfplan_core.trajectory.segment_ends import contact_events
+from cfplan_core.trajectory.timing import frame_times, rest_frames
+from cfplan_core.trajectory.torque_profile import TorqueProfile
 
 # Largest change between frames of a joint or of the object's angle, in rad, and of its position,
 # in object sizes. The format cfplan/plan/1 allows 0.05 of each; half of that for the position
@@ -44,6 +48,8 @@ class Frames:
     segments: tuple[Segment, ...]
     entry_lower: FloatArray
     entry_upper: FloatArray
+    torque_nominal: FloatArray
+    entry_nominal: FloatArray
 
 
 def overloaded_legs(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> list[int]:
@@ -69,17 +75,24 @@ def straying_legs(
     return straying
 
 
-def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]) -> Frames:
+def build_frames(
+    system: ContactSystem,
+    model: ContactModel,
+    legs: Sequence[Leg],
+    options: TrajectoryOptions = TrajectoryOptions(),  # noqa: B008 - it is immutable
+) -> Frames:
     """Sample a path into frames.
 
     A frame shared by two segments carries the torque limits of the earlier one. Times follow from
-    the joints' velocity limits (`frame_times`).
+    limits of velocity and acceleration (`frame_times`).
 
     Args:
         system: Compiled problem.
         model: Gives the torque limits.
         legs: From start to goal, each beginning where the one before ends.
+        options: Of the torque profile and of the times.
     """
+    profile = TorqueProfile(system, model, options.squeeze)
     tracer = Tracer(system, model)
     points: list[FloatArray] = []
     lower: list[FloatArray] = []
@@ -96,6 +109,7 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
             needed = float(model.needed_forces(gradients).max())
             last = first + len(z) - 1
             segments.append(Segment(contacts, stability.value, first, last, needed))
+            profile.add(gradients, z, low, high)
             entry_lower.append(low[0])
             entry_upper.append(high[0])
             shared = 1 if points else 0
@@ -104,16 +118,53 @@ def build_frames(system: ContactSystem, model: ContactModel, legs: Sequence[Leg]
             upper.append(high[shared:])
             first += len(z) - 1
     z = np.concatenate(points)
+    torques = profile.joined()
     return Frames(
-        frame_times(z[:, 3:], np.array([j.velocity_limit for j in system.problem.hand.joints])),
+        _times(system, z, segments, options),
         z[:, 3:],
         system.object_poses(z),
         np.concatenate(lower),
         np.concatenate(upper),
-        tuple(segments),
+        tuple(
+            replace(segment, control=control)
+            for segment, control in zip(segments, torques.controls, strict=True)
+        ),
         np.array(entry_lower),
         np.array(entry_upper),
+        torques.torques,
+        torques.entries,
     )
+
+
+def _times(
+    system: ContactSystem,
+    z: FloatArray,
+    segments: Sequence[Segment],
+    options: TrajectoryOptions,
+) -> FloatArray:
+    """Times of the frames, which are all of the plan."""
+    hand, joints = system.problem.hand.joints, z[:, 3:]
+    masses, inertial = moving_masses(system, z, options.inertia)
+    path = np.concatenate([joints, masses], axis=1)
+    acceleration = [joint.acceleration_limit or ACCELERATION for joint in hand]
+    velocity = np.full(path.shape[1], np.inf)
+    velocity[: len(hand)] = [joint.velocity_limit for joint in hand]
+    pace = np.where(
+        _near_events(joints, segments, options.event_distance), options.event_speed, 1.0
+    )
+    limits = np.concatenate([acceleration, inertial])
+    rests = rest_frames(joints, segments)
+    return frame_times(path, len(hand), velocity, limits, rests, pace)
+
+
+def _near_events(joints: FloatArray, segments: Sequence[Segment], distance: float) -> BoolArray:
+    """Tell which steps come nearer than a distance along the path to a contact event, (f - 1,)."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(joints, axis=0), axis=1))])
+    near = np.zeros(len(joints) - 1, dtype=bool)
+    for event in contact_events(segments):
+        apart = np.abs(way - way[event])
+        near |= np.minimum(apart[1:], apart[:-1]) < distance
+    return near
 
 
 def _steps(system: ContactSystem, z: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from cfplan_core.errors import Finding, InvalidPlanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.trajectory.plan_format import FORMAT, refuse_malformed
 from cfplan_core.trajectory.plan_result import PlanResult, Segment, Statistics, Status
+from cfplan_core.trajectory.segment_ends import SegmentEnd, segment_ends
 
 Document = dict[str, Any]
 
@@ -41,7 +42,7 @@ def write_plan(result: PlanResult, path: str | os.PathLike[str]) -> None:
 def read_plan(path: str | os.PathLike[str]) -> PlanResult:
     """Read a plan file.
 
-    A frame's ``torque_nominal`` and a segment's ``control`` are checked and not kept.
+    ``torque_nominal`` is checked and not kept if only some frames have it.
 
     Args:
         path: A file of the format ``cfplan/plan/1``.
@@ -90,6 +91,8 @@ def _result(document: Document) -> PlanResult:
         rows = [[null if entry is None else entry for entry in frame[key]] for frame in frames]
         return np.array(rows, dtype=np.float64).reshape(len(frames), width)
 
+    planned = bool(frames) and all('torque_nominal' in frame for frame in frames)
+    nominal = column('torque_nominal', len(names)) if planned else np.empty((0, 0))
     return PlanResult(
         problem=document['problem'],
         status=Status(document['status']),
@@ -100,6 +103,7 @@ def _result(document: Document) -> PlanResult:
         object_poses=column('object_pose', 3),
         torque_lower=column('torque_lower', len(names), -math.inf),
         torque_upper=column('torque_upper', len(names), math.inf),
+        torque_nominal=nominal,
         segments=tuple(
             Segment(
                 contacts=tuple(segment['contacts']),
@@ -107,6 +111,7 @@ def _result(document: Document) -> PlanResult:
                 first_frame=int(segment['first_frame']),
                 last_frame=int(segment['last_frame']),
                 needed_force=segment.get('needed_force'),
+                control=segment.get('control'),
             )
             for segment in document['segments']
         ),
@@ -127,14 +132,15 @@ def _statistics(document: Document) -> Statistics:
 
 def _document(result: PlanResult, name: str) -> Document:
     count = len(result.times)
-    for key in ('joints', 'object_poses', 'torque_lower', 'torque_upper'):
+    for key in ('joints', 'object_poses', 'torque_lower', 'torque_upper', 'torque_nominal'):
         rows = len(getattr(result, key))
-        if rows != count:
+        if rows != count and (rows or key != 'torque_nominal'):
             raise _invalid(name, key, f'{rows} rows', f'{count} rows, one per entry of times')
 
     def limits(row: FloatArray, unbounded: float) -> list[float | None]:
         return [None if value == unbounded else value for value in row.tolist()]
 
+    nominal = len(result.torque_nominal) > 0
     statistics = result.statistics
     return {
         'format': FORMAT,
@@ -149,10 +155,14 @@ def _document(result: PlanResult, name: str) -> Document:
                 'object_pose': result.object_poses[k].tolist(),
                 'torque_lower': limits(result.torque_lower[k], -math.inf),
                 'torque_upper': limits(result.torque_upper[k], math.inf),
+                **({'torque_nominal': result.torque_nominal[k].tolist()} if nominal else {}),
             }
             for k in range(count)
         ],
-        'segments': [_segment(segment) for segment in result.segments],
+        'segments': [
+            _segment(segment, end)
+            for segment, end in zip(result.segments, segment_ends(result.segments), strict=True)
+        ],
         'statistics': {
             'planning_time': float(statistics.planning_time),
             'initial_tree_nodes': int(statistics.initial_tree_nodes),
@@ -164,7 +174,7 @@ def _document(result: PlanResult, name: str) -> Document:
     }
 
 
-def _segment(segment: Segment) -> Document:
+def _segment(segment: Segment, end: SegmentEnd) -> Document:
     document: Document = {
         'contacts': list(segment.contacts),
         'stability': segment.stability,
@@ -173,6 +183,13 @@ def _segment(segment: Segment) -> Document:
     }
     if segment.needed_force is not None:
         document['needed_force'] = float(segment.needed_force)
+    if segment.control is not None:
+        document['control'] = dict(segment.control)
+        document['end'] = {
+            'event': end.ending.value,
+            'made': list(end.made),
+            'broken': list(end.broken),
+        }
     return document
 
 

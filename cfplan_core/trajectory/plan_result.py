@@ -32,6 +32,8 @@ class Segment:
         last_frame: Index of the last frame; shared with the segment after.
         needed_force: Largest over its frames of the smallest F such that contact forces of at
             most F hold the object, in weights of the object; None if not known.
+        control: ``position`` or ``effort`` for each joint by name: which to hold stiffly where it
+            is to be, and which to give its nominal torque; None where it was not planned.
     """
 
     contacts: tuple[str, ...]
@@ -39,6 +41,7 @@ class Segment:
     first_frame: int
     last_frame: int
     needed_force: float | None = None
+    control: Mapping[str, str] | None = field(default=None, hash=False)
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,9 @@ class PlanResult:
         entry_lower: Shape (s, n), torque limits of each segment at its first frame, N·m, where
             the frame itself carries those of the segment before. Not in plan files.
         entry_upper: As `entry_lower`.
+        torque_nominal: Shape (f, n), N·m, what the actuators should supply: inside the limits,
+            with the widest margin. Empty where it was not planned.
+        entry_nominal: As `entry_lower`.
         margin: Worst robustness margin of the plan, where it was chosen among several, else None.
         margin_bound: No plan has a larger margin, at the resolution stated; None if not asked.
         alternatives: Other plans, the next best first, each without further ones.
@@ -125,6 +131,8 @@ class PlanResult:
     reversible: bool = False
     entry_lower: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     entry_upper: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    torque_nominal: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    entry_nominal: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     margin: float | None = None
     margin_bound: float | None = None
     alternatives: tuple[PlanResult, ...] = ()

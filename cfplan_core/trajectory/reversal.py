@@ -36,6 +36,10 @@ def reversed_plan(result: PlanResult) -> PlanResult:
         torque_upper=_with_rows(result.torque_upper, firsts, result.entry_upper)[::-1].copy(),
         entry_lower=result.torque_lower[lasts][::-1].copy(),
         entry_upper=result.torque_upper[lasts][::-1].copy(),
+        torque_nominal=_with_rows(result.torque_nominal, firsts, result.entry_nominal)[
+            ::-1
+        ].copy(),
+        entry_nominal=result.torque_nominal[lasts][::-1].copy(),
         segments=tuple(
             replace(
                 segment,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from cfplan_core.verification.checks import BARELY, CHECKS, HAIR, STRICT, UNBOUNDED
+from cfplan_core.verification.checks import BARELY, CHECKS, HAIR, RANK, STRICT, UNBOUNDED
 from cfplan_core.verification.mechanism import FloatArray, Mechanism, Scene
 from cfplan_core.verification.report import Recorder
 from cfplan_core.verification.second_order import second_order_margin
@@ -21,6 +21,7 @@ from cfplan_core.verification.statics import (
     internal_force,
     least_effort,
     smallest_singular_value,
+    torque_distance,
     torque_limits,
 )
 from cfplan_core.verification.touching import Pair, locate
@@ -138,6 +139,66 @@ def check_torques(holds: Sequence[Hold], claimed: Limits, inside: bool, record: 
     record.measure('torque_limits' if inside else 'torque_limits_at_ends', error, frame, what)
     what = 'least effort that holds the object, divided by the effort limits,'
     record.measure('effort', min(efforts), frame, what)
+
+
+def check_nominal(hold: Hold, claimed: Limits, torques: FloatArray, record: Recorder) -> None:
+    """Check that nominal torques are inside the limits, are possible, and balance the object.
+
+    Args:
+        hold: All contacts that may press: those of the segment, or of the two that share a frame.
+        claimed: The limits of the plan.
+        torques: Shape (n,), N·m, of the plan.
+        record: Where to.
+    """
+    joints, unit = hold.mechanism.problem.hand.joints, hold.balance.torque_unit
+    excess = np.maximum(claimed[0] - torques, torques - claimed[1]) / unit
+    for joint, torque, beyond in zip(joints, torques.tolist(), excess.tolist(), strict=True):
+        what = f'nominal torque of {joint.name}, {torque:.9g} N·m, excess over its limits'
+        record.measure('nominal_limits', max(beyond, 0.0), hold.frame, what)
+        what = f'nominal torque of {joint.name}, {torque:.9g} N·m, divided by its effort limit,'
+        record.measure('nominal_effort', abs(torque) / joint.effort_limit, hold.frame, what)
+    what = f'distance of the nominal torques from those that balance the contacts of {hold.owner}'
+    record.measure('nominal_balance', torque_distance(hold.balance, torques), hold.frame, what)
+
+
+def check_control(holds: Sequence[Hold], control: Mapping[str, str], record: Recorder) -> None:
+    """Check that a segment's contacts are kept while the held joints are a little off.
+
+    Object and joints in effort control must be able to follow, Wᵀ q̇ + J_E θ̇_E = −J_P θ̇_P, in one
+    way only. That holds as long as the ranks of these matrices are the largest that they have.
+
+    Args:
+        holds: The segment's contacts in its frames.
+        control: ``position`` or ``effort`` for each joint.
+        record: Where to.
+    """
+    names = holds[0].mechanism.problem.hand.joint_names
+    owner, frame = holds[0].owner, holds[min(1, len(holds) - 1)].frame
+    known = set(control) == set(names) and set(control.values()) <= {'position', 'effort'}
+    message = f'{owner} has control {dict(control)}, expected position or effort for each joint'
+    if not record.require('control', known, frame, message):
+        return
+    effort = [k for k, name in enumerate(names) if control[name] == 'effort']
+    ranks = np.zeros(3, dtype=int)
+    for hold in holds:
+        object_alone, arms = hold.balance.wrenches.T, hold.balance.lever_arms
+        following = np.hstack([object_alone, arms[:, effort]])
+        moving = (object_alone, following, np.hstack([object_alone, arms]))
+        ranks = np.maximum(ranks, [np.linalg.matrix_rank(part, RANK) for part in moving])
+    record.require(
+        'control',
+        bool(ranks[1] == ranks[2]),
+        frame,
+        f'{owner}: with the joints held that are, the grasp jams; {ranks[2] - ranks[1]} more in '
+        'effort control expected',
+    )
+    record.require(
+        'control',
+        bool(ranks[1] == ranks[0] + len(effort)),
+        frame,
+        f'{owner}: {len(effort)} joints are in effort control, expected '
+        f'{ranks[1] - ranks[0]}, as the others are not kept in place by contacts',
+    )
 
 
 def _torque_error(hold: Hold, claimed: Limits, found: Limits) -> tuple[float, str]:

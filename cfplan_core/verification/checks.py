@@ -24,6 +24,9 @@ BARELY = 1e-6
 HAIR = 1e-4
 """Form-closure margin up to which a grasp may also be called one of force closure."""
 
+RANK = 1e-7
+"""Singular value below which motions that keep contacts count as dependent."""
+
 UNBOUNDED = 1e6
 """Torque, in weights times sizes of the object, above which a limit is as good as none."""
 
@@ -68,6 +71,10 @@ CHECKS = {
     'goal_contacts': Rule('the contacts that the goal names touch', TOUCH, 'm'),
     'joint_limits': Rule('joints stay within their limits: excess', 1e-9, 'rad'),
     'joint_velocity': Rule('joint speeds / velocity limit', 1.0 + 1e-9),
+    'joint_acceleration': Rule('joint accelerations / acceleration limit', 1.0 + 1e-6),
+    'inertia': Rule(
+        'inertial forces and moments / their share of weight, weight × size', 1.0 + 1e-6
+    ),
     'joint_step': Rule('joint motion between frames', 0.05 + 1e-9, 'rad'),
     'object_step': Rule('object motion between frames / object size', 0.05 + 1e-9),
     'object_turn': Rule('object rotation between frames', 0.05 + 1e-9, 'rad'),
@@ -87,6 +94,16 @@ CHECKS = {
     'stability_class': Rule('the stability class is the one claimed'),
     'torque_limits': Rule('torque limits inside segments: relative error', 1e-6),
     'torque_limits_at_ends': Rule('torque limits at the ends of segments: relative error', 1e-5),
+    'nominal_limits': Rule(
+        'nominal torques are inside the torque limits: excess / (weight × size)', 1e-9
+    ),
+    'nominal_balance': Rule(
+        'nominal torques balance the object: distance from equilibria / (weight × size)', 1e-5
+    ),
+    'nominal_effort': Rule('nominal torques / effort limit', 1.0 + 1e-9),
+    'control': Rule(
+        'held joints can be off a little without a contact lost, the others cannot move alone'
+    ),
     'effort': Rule('the joints are strong enough: effort needed / effort limit', 1.0 + 1e-9),
     'between_gap': Rule('gaps half-way between frames / (lever × turn²)', 0.25),
     'between_motion': Rule('distance from half-way to the contacts / step', 0.25),

@@ -173,6 +173,32 @@ def least_effort(mechanism: Mechanism, balance: Balance, floor: float) -> float:
     return optimum.value if optimum.found else math.inf
 
 
+def torque_distance(balance: Balance, torques: FloatArray) -> float:
+    """Find how far torques are from those of an equilibrium, in weights times sizes.
+
+    Args:
+        balance: The contacts.
+        torques: Shape (n,), N·m.
+
+    Returns:
+        min over equilibria, with forces above `-BARELY`, of max over joints of the difference; inf
+        without equilibrium.
+    """
+    count = balance.wrenches.shape[1]
+    arms, wanted = balance.lever_arms.T, (torques - balance.link_torques) / balance.torque_unit
+    one = np.ones((len(wanted), 1))
+    optimum = _minimum(
+        np.append(np.zeros(count), 1.0),
+        [*[(-BARELY, None)] * count, (0.0, None)],
+        equal=(np.column_stack([balance.wrenches, np.zeros(3)]), -balance.load),
+        at_most=(
+            np.vstack([np.hstack([arms, -one]), np.hstack([-arms, -one])]),
+            np.concatenate([wanted, -wanted]),
+        ),
+    )
+    return optimum.value if optimum.found else math.inf
+
+
 def _highest(balance: Balance, arms: FloatArray, floor: float) -> float:
     """Largest arms·c over W c = -f, c ≥ floor."""
     count = len(arms)

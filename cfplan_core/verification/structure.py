@@ -84,8 +84,11 @@ def _check_arrays(result: PlanResult, joints: int, record: Recorder) -> bool:
         ('object_poses', 3),
         ('torque_lower', joints),
         ('torque_upper', joints),
+        ('torque_nominal', joints),
     ):
         array = getattr(result, name)
+        if name == 'torque_nominal' and not len(array):
+            continue
         shape = (frames,) if width is None else (frames, width)
         if not record.require(
             'arrays',

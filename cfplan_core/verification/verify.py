@@ -13,6 +13,8 @@ from cfplan_core.verification.balance_checks import (
     Limits,
     check_barely_stable,
     check_class,
+    check_control,
+    check_nominal,
     check_stable,
     check_torques,
 )
@@ -22,6 +24,11 @@ from cfplan_core.verification.contact_checks import (
     check_inside_contacts,
     check_named_contacts,
     check_overlaps,
+)
+from cfplan_core.verification.dynamics import (
+    QUASI_STATIC,
+    check_acceleration,
+    check_inertia,
 )
 from cfplan_core.verification.halfway import halfway
 from cfplan_core.verification.mechanism import Mechanism, Scene, mechanism_of
@@ -36,7 +43,9 @@ Events = Mapping[int, Mapping[str, tuple[Pair, Touch]]]
 """What touches, by contact name, at each frame at which a segment begins or ends."""
 
 
-def verify_plan(problem: Problem, result: PlanResult) -> VerificationReport:
+def verify_plan(
+    problem: Problem, result: PlanResult, inertia: float = QUASI_STATIC
+) -> VerificationReport:
     """Certify a plan, or say what is wrong with it.
 
     Nothing of the planner's geometry and mechanics is used: positions come from kinematics of
@@ -50,6 +59,7 @@ def verify_plan(problem: Problem, result: PlanResult) -> VerificationReport:
     Args:
         problem: What the plan is for; frictionless.
         result: The plan.
+        inertia: Share of the weight up to which inertial forces do not matter.
 
     Returns:
         The verdict, with every failure. A plan whose form is wrong is not checked further.
@@ -70,16 +80,25 @@ def verify_plan(problem: Problem, result: PlanResult) -> VerificationReport:
         check_goal(mechanism, result, scenes[-1], record)
         check_limits(mechanism, result, record)
         check_steps(mechanism, result, scenes, record)
+        check_acceleration(mechanism, result, record)
+        check_inertia(mechanism, result, scenes, inertia, record)
         for frame, scene in enumerate(scenes):
             check_overlaps(mechanism, frame, scene, record)
         ends = {frame for stretch in stretches for frame in (stretch.first, stretch.last)}
         events = {frame: touching_pairs(mechanism, scenes[frame]) for frame in ends}
         for stretch in stretches:
             _check_steps(mechanism, stretch, scenes, events, record)
+            control = result.segments[stretch.number - 1].control
+            if control is not None:
+                frames = range(stretch.first, stretch.last + 1)
+                holds = [_hold(mechanism, stretch, frame, scenes[frame]) for frame in frames]
+                check_control(holds, control, record)
         for frame in range(len(scenes)):
             sharing = [s for s in stretches if s.first <= frame <= s.last]
             claimed = result.torque_lower[frame], result.torque_upper[frame]
-            _check_frame(mechanism, sharing, frame, scenes, claimed, events, record)
+            pressing = _check_frame(mechanism, sharing, frame, scenes, claimed, events, record)
+            if len(result.torque_nominal):
+                check_nominal(pressing, claimed, result.torque_nominal[frame], record)
     return record.report(problem.name, len(result.times))
 
 
@@ -91,7 +110,8 @@ def _check_frame(
     claimed: Limits,
     events: Events,
     record: Recorder,
-) -> None:
+) -> Hold:
+    """Check a frame; return what may press there."""
     scene = scenes[frame]
     for stretch in sharing:
         check_named_contacts(stretch, frame, scene, record)
@@ -115,6 +135,11 @@ def _check_frame(
         owner = ' and '.join(hold.owner for hold in holds)
         check_stable(Hold(mechanism, frame, scene, tuple(together), owner, weakest), record)
     check_torques(holds, claimed, inside, record)
+    if len(holds) == 1:
+        return holds[0]
+    pressing = dict.fromkeys(pair for hold in holds for pair in hold.contacts)
+    owner = ' and '.join(hold.owner for hold in holds)
+    return Hold(mechanism, frame, scene, tuple(pressing), owner, only.stability)
 
 
 def _check_steps(

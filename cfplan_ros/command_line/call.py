@@ -12,6 +12,7 @@ from cfplan_core.command_line.console import INVALID_INPUT, answers, complain
 from cfplan_core.command_line.plan import EXIT_STATUS, finite_seconds, print_result, write_result
 from cfplan_core.command_line.plan_options import wanted_plan
 from cfplan_core.command_line.progress import progress_bar
+from cfplan_core.command_line.trajectory_options import timed_plan, trajectory_options
 from cfplan_core.errors import CfplanError
 from cfplan_core.trajectory.plan_result import PlanResult, Status
 from cfplan_ros.command_line.runtime import needs_rclpy
@@ -74,6 +75,7 @@ _POLL_PERIOD = 0.2
     help='How long to wait for the planner to be there.',
 )
 @wanted_plan
+@timed_plan
 def call(
     file: Path,
     node_name: str,
@@ -105,7 +107,10 @@ def call(
     with needs_rclpy():
         from cfplan_ros.conversions.plans import plan_result
         from cfplan_ros.conversions.requests import request_from_problem
-    options = PlanOptions(time_budget=time_budget, max_nodes=max_nodes, **wanted)
+    trajectory = trajectory_options(wanted)
+    options = PlanOptions(
+        time_budget=time_budget, max_nodes=max_nodes, trajectory=trajectory, **wanted
+    )
     request = request_from_problem(problem, options, plan_only=plan_only)
     response = _answer_to(request, node_name, wait)
     if response is None:

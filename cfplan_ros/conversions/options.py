@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import fields
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, fields
 from enum import Enum
 from typing import Any
 
@@ -11,7 +11,7 @@ from cfplan_msgs.msg import PlanOptions as OptionsMessage
 from geometry_msgs.msg import Point
 
 from cfplan_core.errors import CfplanError, Finding
-from cfplan_core.options import PlanOptions
+from cfplan_core.options import PlanOptions, TrajectoryOptions
 from cfplan_ros.conversions.contacts import contact_names, formation_message
 from cfplan_ros.conversions.request_fields import REQUEST
 from cfplan_ros.conversions.setup import Setup
@@ -47,6 +47,15 @@ def constraint_values(message: OptionsMessage, setup: Setup) -> dict[str, Any]:
     }
 
 
+def trajectory_values(message: OptionsMessage) -> dict[str, Any]:
+    """Read how the path is to become a trajectory, as values of `TrajectoryOptions` by field."""
+    default = TrajectoryOptions()
+    return {
+        field.name: float(getattr(message, field.name)) or getattr(default, field.name)
+        for field in fields(default)
+    }
+
+
 def option_findings(message: OptionsMessage, setup: Setup) -> Iterator[Finding]:
     """Find what is wrong with options by themselves, each with its field."""
     crowded = False
@@ -67,17 +76,29 @@ def option_findings(message: OptionsMessage, setup: Setup) -> Iterator[Finding]:
         if not abs(point.z) <= OUT_OF_PLANE:
             plane = '0: bodies move in the plane z = 0'
             yield _finding(f'stay_within[{k}].z', f'{float(point.z)!r}', plane)
-    for name, value in constraint_values(message, setup).items():
-        try:
-            PlanOptions(**{name: value})
-        except CfplanError as error:
-            got, _, expected = str(error).partition(', expected ')
-            yield _finding(name, got.partition('got ')[2], expected)
+    kinds: tuple[tuple[Callable[..., object], dict[str, Any]], ...] = (
+        (PlanOptions, constraint_values(message, setup)),
+        (TrajectoryOptions, trajectory_values(message)),
+    )
+    for kind, values in kinds:
+        for name, value in values.items():
+            try:
+                kind(**{name: value})
+            except CfplanError as error:
+                got, _, expected = str(error).partition(', expected ')
+                yield _finding(name, got.partition('got ')[2], expected)
 
 
 def constraint_message(options: PlanOptions) -> OptionsMessage:
     """Return options as message, without the limits of the search and the tolerances."""
+    trajectory = options.trajectory
+    # In a message zero leaves the distance to the planner: the whole speed is as good as none.
+    anywhere = trajectory.event_distance == 0.0
     return OptionsMessage(
+        squeeze=float(trajectory.squeeze),
+        inertia=float(trajectory.inertia),
+        event_distance=float(trajectory.event_distance),
+        event_speed=1.0 if anywhere else float(trajectory.event_speed),
         prefer=options.prefer.value,
         alternatives=options.alternatives,
         resolution=float(options.resolution),
@@ -95,6 +116,7 @@ def constraint_message(options: PlanOptions) -> OptionsMessage:
 def options_mapping(options: PlanOptions) -> dict[str, Any]:
     """Return options as plain data, by field."""
     values = {field.name: getattr(options, field.name) for field in fields(options)}
+    values['trajectory'] = asdict(options.trajectory)
     return {
         name: value.value if isinstance(value, Enum) else value for name, value in values.items()
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +22,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from cfplan_core.errors import Finding, InvalidPlanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.trajectory.plan_result import PlanResult, Segment, Statistics, Status
-from cfplan_core.trajectory.timing import joint_velocities
+from cfplan_core.trajectory.segment_ends import segment_ends
+from cfplan_core.trajectory.timing import joint_velocities, rest_frames
+from cfplan_core.trajectory.torque_profile import EFFORT, POSITION
 from cfplan_ros.conversions.contacts import contact_names, formation_message
 from cfplan_ros.conversions.poses import pose_message
 from cfplan_ros.conversions.stabilities import NAMES, NUMBERS
@@ -37,6 +40,7 @@ from cfplan_ros.conversions.trees import tree_message, tree_nodes
 
 _Response = PlanManipulation.Response
 
+_ROLES = {int(PlanSegment.POSITION): POSITION, int(PlanSegment.EFFORT): EFFORT}
 _CLASSES = frozenset(NAMES) - {NUMBERS['']}
 
 _STATUSES = {
@@ -95,8 +99,10 @@ def plan_message(result: PlanResult, frame_id: str, stamp: Time) -> Manipulation
     )
     if not result.solved:
         return message
+    count = len(result.times)
     nanoseconds = whole_nanoseconds(result.times)
-    velocities = joint_velocities(nanoseconds / NANOSECONDS, result.joints)
+    rests = rest_frames(result.joints, result.segments)
+    velocities = joint_velocities(nanoseconds / NANOSECONDS, result.joints, rests)
     message.joint_trajectory.joint_names = list(result.joint_names)
     message.torque_limits.joint_names = list(result.joint_names)
     message.joint_trajectory.points = [
@@ -107,12 +113,16 @@ def plan_message(result: PlanResult, frame_id: str, stamp: Time) -> Manipulation
         )
         for positions, speeds, time in zip(result.joints, velocities, nanoseconds, strict=True)
     ]
+    nominals = result.torque_nominal if len(result.torque_nominal) else [np.empty(0)] * count
     message.torque_limits.points = [
         JointTorqueLimitsPoint(
-            lower=_doubles(lower), upper=_doubles(upper), time_from_start=duration_of(time)
+            lower=_doubles(lower),
+            upper=_doubles(upper),
+            nominal=_doubles(nominal),
+            time_from_start=duration_of(time),
         )
-        for lower, upper, time in zip(
-            result.torque_lower, result.torque_upper, nanoseconds, strict=True
+        for lower, upper, nominal, time in zip(
+            result.torque_lower, result.torque_upper, nominals, nanoseconds, strict=True
         )
     ]
     message.object_poses = [pose_message(pose) for pose in result.object_poses]
@@ -124,8 +134,11 @@ def plan_message(result: PlanResult, frame_id: str, stamp: Time) -> Manipulation
             first_point=segment.first_frame,
             last_point=segment.last_frame,
             needed_force=math.nan if segment.needed_force is None else segment.needed_force,
+            control=_roles(segment.control, result.joint_names),
+            made=formation_message(end.made),
+            broken=formation_message(end.broken),
         )
-        for segment in result.segments
+        for segment, end in zip(result.segments, segment_ends(result.segments), strict=True)
     ]
     return message
 
@@ -246,6 +259,7 @@ def _with_frames(result: PlanResult, plan: ManipulationPlan, owner: str) -> Plan
         (pose.position.x, pose.position.y, angle)
         for pose, angle in zip(plan.object_poses, plan.object_angles, strict=True)
     ]
+    planned = bool(limits) and all(len(point.nominal) for point in limits)
     return replace(
         result,
         times=np.array([nanoseconds_of(p.time_from_start) for p in points]) / NANOSECONDS,
@@ -253,6 +267,9 @@ def _with_frames(result: PlanResult, plan: ManipulationPlan, owner: str) -> Plan
         object_poses=_rows(poses, 3),
         torque_lower=_rows([p.lower for p in limits], width),
         torque_upper=_rows([p.upper for p in limits], width),
+        torque_nominal=(
+            _rows([p.nominal for p in limits], width) if planned else np.empty((0, 0))
+        ),
         segments=tuple(
             Segment(
                 contacts=contact_names(segment.contact_formation),
@@ -260,6 +277,7 @@ def _with_frames(result: PlanResult, plan: ManipulationPlan, owner: str) -> Plan
                 first_frame=int(segment.first_point),
                 last_frame=int(segment.last_point),
                 needed_force=(None if math.isnan(segment.needed_force) else segment.needed_force),
+                control=_control(segment.control, result.joint_names),
             )
             for segment in plan.segments
         ),
@@ -299,6 +317,16 @@ def _refuse_misfits(plan: ManipulationPlan, owner: str) -> None:
         if segment.stability not in _CLASSES
         or not segment.first_point <= segment.last_point < count
     ]
+    for k, point in enumerate(limits.points):
+        if len(point.nominal) not in (0, width):
+            field = f'plan.torque_limits.points[{k}].nominal'
+            got = f'{len(point.nominal)} entries'
+            found.append(Finding('response', field, got, f'{width}, one per joint, or none'))
+    for k, segment in enumerate(plan.segments):
+        roles = list(segment.control)
+        if roles and not (len(roles) == width and set(roles) <= _ROLES.keys()):
+            wanted = f'{width} of PlanSegment.POSITION and EFFORT, one per joint, or none'
+            found.append(Finding('response', f'plan.segments[{k}].control', repr(roles), wanted))
     if list(limits.joint_names) != list(trajectory.joint_names):
         found.append(
             Finding(
@@ -310,6 +338,17 @@ def _refuse_misfits(plan: ManipulationPlan, owner: str) -> None:
         )
     if found:
         raise InvalidPlanError('\n'.join(str(finding) for finding in found))
+
+
+def _roles(control: Mapping[str, str] | None, names: Sequence[str]) -> list[int]:
+    numbers = {role: number for number, role in _ROLES.items()}
+    return [] if control is None else [numbers[control[name]] for name in names]
+
+
+def _control(roles: Sequence[int], names: Sequence[str]) -> dict[str, str] | None:
+    if not roles:
+        return None
+    return {name: _ROLES[role] for name, role in zip(names, roles, strict=True)}
 
 
 def _doubles(values: FloatArray) -> array[float]:

@@ -14,6 +14,7 @@ from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Goal, Problem
 from cfplan_core.model.loading import problem_from_mapping
+from cfplan_core.options import TrajectoryOptions
 from cfplan_core.planner import PlanOptions
 from cfplan_core.planning.grasp_check import check_problem
 from cfplan_core.trajectory.plan_result import PlanResult
@@ -23,6 +24,7 @@ from cfplan_ros.conversions.options import (
     constraint_message,
     constraint_values,
     option_findings,
+    trajectory_values,
 )
 from cfplan_ros.conversions.poses import pose_message
 from cfplan_ros.conversions.request_fields import InvalidRequestError as InvalidRequestError
@@ -77,6 +79,7 @@ def problem_from_request(
     return replace(problem, name=request.problem_name), PlanOptions(
         time_budget=time_budget(request, setup)[0],
         max_nodes=options.max_nodes or None,
+        trajectory=TrajectoryOptions(**trajectory_values(options)),
         **constraint_values(options, setup),
     )
 

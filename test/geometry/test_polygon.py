@@ -11,6 +11,7 @@ from cfplan_core.geometry.polygon import (
     first_self_intersection,
     is_flat,
     repeated_vertices,
+    second_moment,
     signed_area,
 )
 
@@ -54,6 +55,19 @@ def test_area_of_a_counter_clockwise_square_is_positive():
 
 def test_area_of_a_clockwise_square_is_negative():
     assert signed_area(SQUARE[::-1]) == -4.0
+
+
+def test_second_moment_of_a_rectangle_about_its_centre_and_a_corner():
+    box = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [0.0, 1.0]])
+    assert second_moment(box, np.array([1.5, 0.5])) == pytest.approx((9.0 + 1.0) / 12.0)
+    assert second_moment(box, np.zeros(2)) == pytest.approx((9.0 + 1.0) / 3.0)
+
+
+def test_second_moment_of_an_l_shape_is_that_of_its_three_squares():
+    about = np.array([0.3, 0.2])
+    middles = np.array([[0.5, 0.5], [1.5, 0.5], [0.5, 1.5]]) - about
+    expected = 1.0 / 6.0 + (middles**2).sum() / 3.0
+    assert second_moment(L_SHAPE, about) == pytest.approx(expected)
 
 
 def test_area_of_a_small_polygon_far_away_is_exact():

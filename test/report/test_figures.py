@@ -29,6 +29,7 @@ from cfplan_core.report.figures.grasps import grasps_of, inward_direction
 from cfplan_core.report.figures.timeline import SEGMENT_LABEL
 from cfplan_core.report.figures.torque import (
     LOWER,
+    NOMINAL,
     UNBOUNDED,
     UPPER,
     finite_runs,
@@ -410,6 +411,29 @@ def test_the_torque_view_of_no_finite_limit_is_finite() -> None:
     low, high = torque_view(np.full(3, -np.inf), np.full(3, np.inf))
     assert np.isfinite(low)
     assert low < 0.0 < high
+
+
+def test_the_torque_view_shows_all_nominal_torques() -> None:
+    low, high = torque_view(np.zeros(4), np.full(4, 0.1), np.array([0.05, -0.7, 0.9, 0.1]))
+    assert low < -0.7 < 0.9 < high
+
+
+def test_figure_7_draws_nominal_torques_where_they_are_planned(
+    problem: Problem, result: PlanResult
+) -> None:
+    nominal = np.linspace(-0.1, 0.1, result.joints.size).reshape(result.joints.shape)
+    figure = torque_figure(problem, replace(result, torque_nominal=nominal))
+    for k in range(len(result.joint_names)):
+        (line,) = (line for line in figure.axes[k].lines if line.get_gid() == NOMINAL)
+        np.testing.assert_array_equal(line.get_ydata(), nominal[:, k])
+    assert NOMINAL in [text.get_text() for text, _ in texts(figure)]
+
+
+def test_figure_7_has_no_nominal_torques_where_none_are_planned(
+    problem: Problem, result: PlanResult
+) -> None:
+    figure = torque_figure(problem, replace(result, torque_nominal=np.empty((0, 0))))
+    assert not [line for axes in figure.axes for line in axes.lines if line.get_gid() == NOMINAL]
 
 
 def test_finite_runs_are_longest_stretches() -> None:

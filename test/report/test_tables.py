@@ -10,6 +10,7 @@ from rich.console import Console
 from cfplan_core.model import Problem
 from cfplan_core.report.tables import MOST_FAILURES, print_plan
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics
+from cfplan_core.trajectory.segment_ends import segment_ends
 
 
 def printed(result: PlanResult, problem: Problem | None = None, width: int = 100) -> str:
@@ -116,3 +117,24 @@ def test_tables_keep_contacts_in_one_line(result: PlanResult, width: int) -> Non
     assert max(len(line) for line in lines) <= width
     for segment in result.segments:
         assert all(any(name in line for line in lines) for name in segment.contacts)
+
+
+def test_contacts_that_break_and_are_made_are_marked(result: PlanResult) -> None:
+    text = printed(result)
+    found = 0
+    for segment, end in zip(result.segments, segment_ends(result.segments), strict=True):
+        for name in segment.contacts:
+            assert name in text
+        for names, mark in ((end.broken, '-'), (end.made, '+')):
+            for name in names:
+                assert f'{mark} {name}' in text
+                found += 1
+    assert found > 4
+
+
+def test_torque_controlled_joints_are_listed_where_they_are_planned(result: PlanResult) -> None:
+    control = {'left_joint': 'position', 'right_joint': 'effort'}
+    first = replace(result.segments[0], control=control)
+    planned = replace(result, segments=(first, *result.segments[1:]))
+    assert 'by torque' in printed(planned)
+    assert 'by torque' not in printed(result)

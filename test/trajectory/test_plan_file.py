@@ -113,6 +113,21 @@ def test_file_has_the_keys_of_the_format_in_its_order(result: PlanResult, tmp_pa
     assert [list(segment) for segment in document['segments']] == [segment_keys] * 2
 
 
+def test_nominal_torques_read_back_as_written(result: PlanResult, tmp_path: Path) -> None:
+    planned = replace(result, torque_nominal=np.arange(8.0).reshape(4, 2) / 7.0)
+    write_plan(planned, tmp_path / 'plan.json')
+    back = read_plan(tmp_path / 'plan.json')
+    np.testing.assert_array_equal(back.torque_nominal, planned.torque_nominal)
+    assert equal(back, result)
+
+
+def test_a_plan_without_nominal_torques_reads_back_without(
+    result: PlanResult, tmp_path: Path
+) -> None:
+    write_plan(result, tmp_path / 'plan.json')
+    assert read_plan(tmp_path / 'plan.json').torque_nominal.shape == (0, 0)
+
+
 def test_unbounded_torque_is_null(result: PlanResult, tmp_path: Path) -> None:
     write_plan(result, tmp_path / 'plan.json')
     frame = json.loads((tmp_path / 'plan.json').read_text(encoding='utf-8'))['frames'][0]
@@ -144,7 +159,14 @@ def test_planned_torque_and_control_are_part_of_the_format(
     document['frames'][0]['torque_nominal'] = [0.0, 0.1]
     document['segments'][0]['control'] = {'left': 'position', 'right': 'effort'}
     path.write_text(json.dumps(document), encoding='utf-8')
-    assert equal(read_plan(path), result)
+    control = {'left': 'position', 'right': 'effort'}
+    first = replace(result.segments[0], control=control)
+    kept = replace(result, segments=(first, *result.segments[1:]))
+    assert equal(read_plan(path), kept)
+    write_plan(kept, path)
+    assert equal(read_plan(path), kept)
+    (end, *_) = (s.get('end') for s in json.loads(path.read_text(encoding='utf-8'))['segments'])
+    assert end == {'event': 'contacts', 'made': [], 'broken': ['object.e1|left.tip.v1']}
 
 
 @pytest.mark.parametrize('status', [s for s in Status if s is not Status.SOLVED])

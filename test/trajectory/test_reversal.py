@@ -24,7 +24,7 @@ from cfplan_core.contact.elements import parse_contact
 from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.mechanics.frictionless import FrictionlessModel
-from cfplan_core.trajectory.timing import fastest, joint_velocities
+from cfplan_core.trajectory.timing import fastest, joint_velocities, rest_frames
 
 PROBLEMS = Path(__file__).parents[2] / 'config' / 'problems'
 NAMES = sorted(path.stem for path in PROBLEMS.glob('h*.yaml') if len(path.stem) < 6)
@@ -86,7 +86,8 @@ def test_reversing_twice_gives_the_plan_back() -> None:
 def test_a_reversed_plan_keeps_velocity_limits_and_whole_nanoseconds() -> None:
     problem, result = planned('trinkle_hunter_1991')
     back = result.reversed()
-    speeds = fastest(back.times, back.joints, joint_velocities(back.times, back.joints))
+    rests = rest_frames(back.joints, back.segments)
+    speeds = fastest(back.times, back.joints, joint_velocities(back.times, back.joints, rests))
     limits = [joint.velocity_limit for joint in problem.hand.joints]
     assert (speeds <= np.array(limits) * (1.0 + 1e-9)).all()
     assert back.times[0] == 0.0

@@ -67,7 +67,11 @@ def test_plan_of_one_frame_is_certified(squeezed: Plan) -> None:
 
 
 def test_every_check_is_applied_to_a_plan_with_a_full_goal(sliding: Plan) -> None:
-    assert [check.name for check in verify_plan(*sliding).checks if check.count == 0] == []
+    problem, result = with_nominal(sliding)
+    left, right = problem.hand.fingers
+    limited = replace(left, joints=(replace(left.joints[0], acceleration_limit=20.0),))
+    problem = replace(problem, hand=Hand(problem.hand.palm, (limited, right)))
+    assert [check.name for check in verify_plan(problem, result).checks if check.count == 0] == []
 
 
 def test_object_lifted_by_10_micrometres_loses_its_contacts(sliding: Plan) -> None:
@@ -410,6 +414,98 @@ def test_shared_frame_may_not_mix_the_torque_limits_of_its_segments(sliding: Pla
     upper[8, 1] = upper[9, 1]
     report = verify_plan(problem, replace(result, torque_upper=upper))
     assert failed(report) == {'torque_limits_at_ends'}
+
+
+def controlled(plan: Plan, left: str, right: str) -> Plan:
+    """The same roles in all segments."""
+    problem, result = plan
+    control = {'left_joint': left, 'right_joint': right}
+    segments = tuple(replace(segment, control=control) for segment in result.segments)
+    return problem, replace(result, segments=segments)
+
+
+def with_nominal(plan: Plan) -> Plan:
+    """The sliding box with the middles of its limits; where two segments meet, of the earlier."""
+    problem, result = controlled(plan, 'position', 'effort')
+    nominal = 0.5 * (result.torque_lower + result.torque_upper)
+    return problem, replace(result, torque_nominal=nominal)
+
+
+def test_one_finger_held_and_one_in_torque_control_is_certified(sliding: Plan) -> None:
+    assert verify_plan(*controlled(sliding, 'position', 'effort')).failures == ()
+
+
+@pytest.mark.parametrize(
+    ('left', 'right', 'message'),
+    [
+        ('position', 'position', 'the grasp jams; 1 more in effort control expected'),
+        ('effort', 'effort', '2 joints are in effort control, expected 1'),
+    ],
+)
+def test_control_that_does_not_keep_the_contacts_is_found(
+    sliding: Plan, left: str, right: str, message: str
+) -> None:
+    report = verify_plan(*controlled(sliding, left, right))
+    assert failed(report) == {'control'}
+    assert any(message in failure.message for failure in report.failures)
+
+
+def test_left_finger_that_lifts_off_cannot_be_in_torque_control(sliding: Plan) -> None:
+    problem, result = controlled(sliding, 'effort', 'position')
+    report = verify_plan(problem, result)
+    assert failed(report) == {'control'}
+    assert frames_failing(report, 'control') == {9}
+
+
+def test_control_of_an_unknown_joint_is_found(sliding: Plan) -> None:
+    problem, result = sliding
+    spoiled = with_segment(result, 0, control={'left_joint': 'effort', 'thumb': 'position'})
+    assert failed(verify_plan(problem, spoiled)) == {'control'}
+
+
+def test_nominal_torques_in_the_middle_are_certified(sliding: Plan) -> None:
+    assert verify_plan(*with_nominal(sliding)).failures == ()
+
+
+def test_nominal_torques_between_two_segments_are_certified(sliding: Plan) -> None:
+    problem, result = with_nominal(sliding)
+    # At the event any mixture of both segments' forces is an equilibrium of all contacts.
+    entry = 0.5 * (result.torque_lower[9] + result.torque_upper[9])
+    nominal = result.torque_nominal.copy()
+    upper, lower = result.torque_upper[8], result.torque_lower[8]
+    nominal[8] = 0.9 * nominal[8] + 0.1 * entry
+    assert ((lower <= nominal[8]) & (nominal[8] <= upper)).all()
+    assert verify_plan(problem, replace(result, torque_nominal=nominal)).ok
+
+
+def test_nominal_torque_outside_its_limits_is_found(sliding: Plan) -> None:
+    problem, result = with_nominal(sliding)
+    nominal = result.torque_nominal.copy()
+    nominal[10, 1] = 1.01 * result.torque_upper[10, 1]
+    report = verify_plan(problem, replace(result, torque_nominal=nominal))
+    assert failed(report) == {'nominal_limits', 'nominal_balance'}
+    assert {failure.frame for failure in report.failures} == {10}
+
+
+def test_nominal_torques_that_do_not_balance_together_are_found(sliding: Plan) -> None:
+    problem, result = with_nominal(sliding)
+    report = verify_plan(problem, shifted(result, 'torque_nominal', (4, 1), -1e-4))
+    assert failed(report) == {'nominal_balance'}
+
+
+def test_nominal_torque_beyond_the_effort_limit_is_found(sliding: Plan) -> None:
+    problem, result = with_nominal(sliding)
+    left, right = problem.hand.fingers
+    limit = 0.9 * float(np.abs(result.torque_nominal[:, 1]).max())
+    weak = replace(right, joints=(replace(right.joints[0], effort_limit=limit),))
+    report = verify_plan(replace(problem, hand=Hand(problem.hand.palm, (left, weak))), result)
+    assert failed(report) == {'nominal_effort'}
+
+
+def test_nominal_torques_must_fit_the_frames(sliding: Plan) -> None:
+    problem, result = sliding
+    report = verify_plan(problem, replace(result, torque_nominal=np.zeros((3, 2))))
+    assert failed(report) == {'arrays'}
 
 
 def test_bound_on_an_unbounded_torque_is_found(squeezed: Plan) -> None:

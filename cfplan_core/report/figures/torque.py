@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from cfplan_core.geometry.polygon import FloatArray
@@ -16,12 +17,16 @@ from cfplan_core.report.style import INK, MUTED, SMALL_FONT_SIZE, joint_colours
 from cfplan_core.trajectory.plan_result import PlanResult, Segment
 
 LOWER, UPPER, UNBOUNDED = 'lower limit', 'upper limit', 'unbounded'
+NOMINAL = 'nominal torque'
+_NONE = np.empty(0)
 _TYPICAL = 85.0
 _HATCH = '////'
 
 
 def torque_figure(problem: Problem, result: PlanResult) -> Figure:
     """A panel per joint: the band between its limits, hatched where a side is unbounded.
+
+    A dashed line shows the nominal torques where they were planned.
 
     A limit tends to infinity where form closure begins; the panels show typical values and let
     such limits leave them. Limits jump where a segment ends.
@@ -34,7 +39,8 @@ def torque_figure(problem: Problem, result: PlanResult) -> Figure:
     colours = joint_colours(problem.hand)
     for k, (axes, name) in enumerate(zip(panels, result.joint_names, strict=True)):
         lower, upper = result.torque_lower[:, k], result.torque_upper[:, k]
-        low, high = torque_view(lower, upper)
+        nominal = result.torque_nominal[:, k] if len(result.torque_nominal) else _NONE
+        low, high = torque_view(lower, upper, nominal)
         axes.set_ylim(low, high)
         axes.axhline(0.0, color=MUTED, linewidth=0.6, zorder=1.5)
         at = np.repeat(result.times, 2)[1:-1]
@@ -47,17 +53,24 @@ def torque_figure(problem: Problem, result: PlanResult) -> Figure:
             if alone.any():
                 points = result.times[alone], values[alone]
                 axes.plot(*points, '.', color=colours[name], gid=label)
+        if len(nominal):
+            axes.plot(result.times, nominal, color=INK, linewidth=1.0, dashes=(4, 2), gid=NOMINAL)
         axes.set_ylabel(f'{name}\ntorque (N·m)', fontsize=SMALL_FONT_SIZE, color=INK)
+    if len(result.torque_nominal):
+        _nominal_legend(figure)
     figure.align_ylabels(panels)
     return figure
 
 
-def torque_view(lower: FloatArray, upper: FloatArray) -> tuple[float, float]:
-    """Vertical limits that show the typical size of limits, and zero, N·m.
+def torque_view(
+    lower: FloatArray, upper: FloatArray, nominal: FloatArray = _NONE
+) -> tuple[float, float]:
+    """Vertical limits that show the typical size of limits, all nominal torques, and zero, N·m.
 
     Args:
         lower: Shape (f,), N·m, may be infinite.
         upper: Shape (f,), N·m, may be infinite.
+        nominal: Shape (f,), N·m, or (0,).
     """
     values = [v[np.isfinite(v)] for v in (lower, upper)]
     ends = [0.0]
@@ -65,10 +78,14 @@ def torque_view(lower: FloatArray, upper: FloatArray) -> tuple[float, float]:
         if len(v):
             ends += [float(np.percentile(v, 100.0 - _TYPICAL)), float(np.percentile(v, _TYPICAL))]
     low, high = min(ends), max(ends)
-    if high - low < 1e-9:
+    if high - low < 1e-9 and not nominal.any():
         return -1.0, 1.0
     pad = 0.3 * (high - low)
-    return low - pad, high + pad
+    low, high = low - pad, high + pad
+    if not len(nominal):
+        return low, high
+    pad = 0.05 * float(max(high, nominal.max()) - min(low, nominal.min()))
+    return min(low, float(nominal.min()) - pad), max(high, float(nominal.max()) + pad)
 
 
 def interval_limits(values: FloatArray, segments: Sequence[Segment]) -> FloatArray:
@@ -94,6 +111,20 @@ def interval_limits(values: FloatArray, segments: Sequence[Segment]) -> FloatArr
         holds = np.isinf(part) if segment.stability == 'form_closure' else np.isfinite(part)
         part[:] = np.where(holds.any(axis=1, keepdims=True) & ~holds, part[:, ::-1], part)
     return ends
+
+
+def _nominal_legend(figure: Figure) -> None:
+    """Say right above the panels what the dashed line is."""
+    across, up = figure.get_size_inches()
+    figure.legend(
+        handles=[Line2D([], [], color=INK, linewidth=1.0, dashes=(4, 2), label=NOMINAL)],
+        loc='upper right',
+        bbox_to_anchor=(1.0 - 0.15 / across, 1.0 - 0.06 / up),
+        frameon=False,
+        fontsize=SMALL_FONT_SIZE,
+        borderaxespad=0.0,
+        borderpad=0.0,
+    )
 
 
 def finite_runs(values: FloatArray) -> Iterator[slice]:

@@ -28,13 +28,14 @@ from cfplan_core import (
     plan,
 )
 from cfplan_core.trajectory.plan_result import TreeNode
-from cfplan_core.trajectory.timing import joint_velocities
+from cfplan_core.trajectory.timing import joint_velocities, rest_frames
 from cfplan_ros.conversions.plans import plan_message, plan_result, refusal, response_of
 from cfplan_ros.conversions.times import nanoseconds_of
 
 Response = PlanManipulation.Response
 STAMP = Time(sec=1_700_000_000, nanosec=123_456_789)
-ARRAYS = ('times', 'joints', 'object_poses', 'torque_lower', 'torque_upper')
+ARRAYS = ('times', 'joints', 'object_poses', 'torque_lower', 'torque_upper', 'torque_nominal')
+ROLES = ('position', 'effort')
 CONTACTS = ('object.v0|palm.0.e2', 'object.v1|palm.0.e2', 'object.e3|left.link_1.v2')
 STABILITIES = ('form_closure', 'force_closure', 'second_order')
 COUNTS = st.integers(0, 2**32 - 1)
@@ -94,6 +95,12 @@ def plans(draw: st.DrawFn) -> PlanResult:
             first,
             last,
             draw(st.none() | st.floats(0.0, 1e6)),
+            draw(
+                st.none()
+                | st.fixed_dictionaries(
+                    {f'joint_{k}': st.sampled_from(ROLES) for k in range(width)}
+                )
+            ),
         )
         for first, last in zip(ends, ends[1:] or ends, strict=False)
     ]
@@ -106,6 +113,7 @@ def plans(draw: st.DrawFn) -> PlanResult:
         object_poses=draw(arrays(float, (count, 3), elements=numbers)),
         torque_lower=draw(arrays(float, shape, elements=unbounded)),
         torque_upper=draw(arrays(float, shape, elements=unbounded)),
+        torque_nominal=draw(st.just(np.empty((0, 0))) | arrays(float, shape, elements=numbers)),
         segments=tuple(segments),
         statistics=Statistics(
             draw(st.floats(0.0, 1e4)), len(grown[0]), len(grown[1]), draw(COUNTS), draw(COUNTS)
@@ -172,7 +180,8 @@ def test_an_example_can_be_followed_by_a_controller(
 
 def test_velocities_are_the_slopes_of_the_plan(story_plan: PlanResult) -> None:
     points = plan_message(story_plan, 'palm', STAMP).joint_trajectory.points
-    expected = joint_velocities(story_plan.times, story_plan.joints)
+    rests = rest_frames(story_plan.joints, story_plan.segments)
+    expected = joint_velocities(story_plan.times, story_plan.joints, rests)
     assert np.array([point.velocities for point in points]).tobytes() == expected.tobytes()
     assert not any(len(point.accelerations) or len(point.effort) for point in points)
 
@@ -271,6 +280,12 @@ def test_a_wrong_request_is_an_invalid_problem(code: int) -> None:
             r'segments\[0\]: got stability 0',
         ),
         (lambda plan: setattr(plan.segments[-1], 'last_point', 9999), 'to 9999'),
+        (lambda plan: setattr(plan.segments[0], 'control', [1]), r'control: got \[1\], expected'),
+        (lambda plan: setattr(plan.segments[0], 'control', [1, 7]), r'control: got \[1, 7\]'),
+        (
+            lambda plan: setattr(plan.torque_limits.points[3], 'nominal', [0.1]),
+            r'points\[3\].nominal: got 1 entries, expected 2',
+        ),
     ],
 )
 def test_an_answer_that_does_not_fit_together_is_refused(

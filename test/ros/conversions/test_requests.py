@@ -23,6 +23,7 @@ from cfplan_core import (
     Preference,
     Problem,
     Tolerance,
+    TrajectoryOptions,
     load_problem,
     plan,
 )
@@ -309,6 +310,7 @@ EVERYTHING = PlanOptions(
     second_order=False,
     prefer=Preference.ROBUST,
     alternatives=3,
+    trajectory=TrajectoryOptions(2.0, 0.1, 0.02, 0.5),
     seed=5,
 )
 
