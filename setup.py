@@ -56,8 +56,10 @@ setup(
         'toppra>=0.6.10',
     ],
     extras_require={
+        'mujoco': ['mujoco>=3.3'],
         'test': [
             'hypothesis>=6.100',
+            'mujoco>=3.3',
             'psutil>=5.9',
             'pytest>=7.4',
             'pytest-benchmark>=4.0',
@@ -74,6 +76,7 @@ setup(
         'cfplan.commands': [
             'bag = cfplan_ros.command_line.bag:bag',
             'call = cfplan_ros.command_line.call:call',
+            'execute = cfplan_ros.command_line.execute:execute',
             'node = cfplan_ros.command_line.node:node',
             'recover = cfplan_ros.command_line.recover:recover',
         ],

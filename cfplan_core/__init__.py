@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from cfplan_core.errors import Finding as Finding
     from cfplan_core.errors import InvalidPlanError as InvalidPlanError
     from cfplan_core.errors import InvalidProblemError as InvalidProblemError
+    from cfplan_core.execution.execute import Execution as Execution
+    from cfplan_core.execution.execute import ExecutionOptions as ExecutionOptions
+    from cfplan_core.execution.execute import execute_plan as execute_plan
+    from cfplan_core.execution.perturbation import Uncertainty as Uncertainty
     from cfplan_core.exploration import Exploration as Exploration
     from cfplan_core.exploration import explore as explore
     from cfplan_core.model import Finger as Finger
@@ -48,6 +52,8 @@ __version__ = '0.1.0'
 
 _HOMES = {
     'errors': ('CfplanError', 'Finding', 'InvalidPlanError', 'InvalidProblemError'),
+    'execution.execute': ('Execution', 'ExecutionOptions', 'execute_plan'),
+    'execution.perturbation': ('Uncertainty',),
     'exploration': ('Exploration', 'explore'),
     'model': (
         'Finger',

@@ -84,7 +84,7 @@ def contact_forces(
     for stretch in stretches:
         names = stretch.contacts
         pairs = np.array([system.pair(parse_contact(name)) for name in names], dtype=np.intp)
-        placed = system.place(_configurations(system, stretch))
+        placed = system.place(configurations(system, stretch.object_poses, stretch.joints))
         vertices = placed.vertices[:, system.pair_vertex[pairs]] * system.size
         points.append(np.stack([vertices.real, vertices.imag], axis=-1))
         wrenches.append(gap_gradients(system, placed, pairs)[..., :3])
@@ -100,14 +100,16 @@ def contact_forces(
     )
 
 
-def _configurations(system: ContactSystem, stretch: Stretch) -> FloatArray:
-    """Configurations z of a stretch, shape (f, 3 + n)."""
-    poses = stretch.object_poses
+def configurations(
+    system: ContactSystem, object_poses: FloatArray, joints: FloatArray
+) -> FloatArray:
+    """Turn poses of the object's frame (s, 3) and joints (s, n) into z, shape (s, 3 + n)."""
+    poses = object_poses
     com = system.problem.object.center_of_mass
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     shift = np.stack([c * com[0] - s * com[1], s * com[0] + c * com[1]], axis=1)
     center = (poses[:, :2] + shift) / system.size
-    return np.concatenate([center, poses[:, 2:], stretch.joints], axis=1)
+    return np.concatenate([center, poses[:, 2:], joints], axis=1)
 
 
 def least_forces(wrenches: FloatArray, load: FloatArray) -> FloatArray:

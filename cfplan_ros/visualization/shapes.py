@@ -14,7 +14,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_ros.visualization.triangulation import triangulate
+from cfplan_core.geometry.triangulation import triangulate
 
 
 @dataclass(frozen=True)

@@ -30,18 +30,22 @@ _STRIP = 0.2
 _GAP = 0.16
 
 
-def timeline(result: PlanResult, panel: float) -> tuple[Figure, tuple[Axes, ...]]:
-    """Make a figure with one panel per joint over the plan's time.
+def timeline(
+    result: PlanResult, panel: float, names: Sequence[str] | None = None
+) -> tuple[Figure, tuple[Axes, ...]]:
+    """Make a figure with panels over the plan's time.
 
     Args:
         result: A solved one.
-        panel: Height of a panel, inches; more if a joint's name needs it.
+        panel: Height of a panel, inches; more if a name needs it.
+        names: Of the panels; those of the joints if not given.
 
     Returns:
-        The figure and a panel per joint, whose time limits are final.
+        The figure and a panel per name, whose time limits are final.
     """
-    joints = len(result.joint_names)
-    panel = max(panel, *text_widths(result.joint_names))
+    names = result.joint_names if names is None else names
+    joints = len(names)
+    panel = max(panel, *text_widths(names))
     rows = _label_rows(result)
     strip = _STRIP * (max(rows, default=0) + 1)
     height = _BOTTOM + joints * (panel + _GAP) + strip + _TOP

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cfplan_core.geometry.polygon import signed_area
-from cfplan_ros.visualization.triangulation import triangulate
+from cfplan_core.geometry.triangulation import triangulate
 
 FloatArray = NDArray[np.float64]
 

@@ -1,0 +1,56 @@
+"""The plans of the example problems run in MuJoCo."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from cfplan_core import PlanResult, Problem, load_problem, plan
+from cfplan_core.execution.execute import ExecutionOptions, execute_plan
+from cfplan_core.execution.outcome import Outcome
+from cfplan_core.execution.perturbation import Uncertainty
+
+PROBLEMS = Path(__file__).parents[2] / 'config' / 'problems'
+NAMES = [
+    *('h013', 'h020', 'h045', 'h1004', 'h1181', 'h120', 'h122', 'h205', 'h447'),
+    'trinkle_hunter_1991',
+]
+# Friction holds its object in another pose that the joints allow nearly as well.
+JAMS = 'h013'
+
+
+@cache
+def _planned(name: str) -> tuple[Problem, PlanResult]:
+    problem = load_problem(PROBLEMS / f'{name}.yaml')
+    return problem, plan(problem)
+
+
+def _outcome(name: str, friction: float) -> Outcome:
+    options = ExecutionOptions(Uncertainty(friction=friction))
+    return execute_plan(*_planned(name), options).outcome
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_object_ends_in_the_goal_without_friction(name: str) -> None:
+    outcome = _outcome(name, 0.0)
+    assert outcome.final_position_error <= 1e-3
+    assert outcome.final_angle_error <= 0.02
+    size = _planned(name)[0].object.size
+    assert outcome.largest_position_deviation <= 0.05 * size
+    assert outcome.largest_angle_deviation <= 0.1
+    assert outcome.lost == ()
+
+
+@pytest.mark.parametrize('name', [name for name in NAMES if name != JAMS])
+def test_object_ends_in_the_goal_with_friction_that_was_not_planned(name: str) -> None:
+    outcome = _outcome(name, 0.1)
+    assert outcome.final_position_error <= 2e-3
+    assert outcome.final_angle_error <= 0.05
+
+
+def test_jam_is_named_by_the_contact_that_was_lost() -> None:
+    outcome = _outcome(JAMS, 0.1)
+    assert not outcome.in_goal
+    assert outcome.lost[0].contact == 'object.v3|left.link_1.e0'
