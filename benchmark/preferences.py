@@ -69,7 +69,10 @@ def _compared(problem: Problem, first: PlanResult, robust: PlanResult) -> str:
     )
     before = plan_margin(problem, first)
     worst, term = min(
-        (float(getattr(segment, name).min()), f'{name}, {", ".join(part.contacts)}')
+        (
+            float(getattr(segment, name).min()),
+            f'{name}, {", ".join(part.contacts)}'.replace('|', '\\|'),
+        )
         for segment, part in zip(rated, robust.segments, strict=True)
         for name in (*TERMS, 'clearance')
     )

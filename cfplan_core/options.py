@@ -134,8 +134,8 @@ class PlanOptions:
             raise CfplanError(
                 f'alternatives: got {self.alternatives}, expected a number above zero'
             )
-        if self.seed < 0:
-            raise CfplanError(f'seed: got {self.seed}, expected a whole number from 0')
+        if not 0 <= self.seed < 2**32:
+            raise CfplanError(f'seed: got {self.seed}, expected a whole number from 0 to 2³² − 1')
         for field in ('forbidden', 'required'):
             if any(isinstance(names, str) or not names for names in getattr(self, field)):
                 raise CfplanError(

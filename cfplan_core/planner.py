@@ -25,7 +25,7 @@ from cfplan_core.planning.constraints import (
     compile_constraints,
     contradictions,
 )
-from cfplan_core.planning.equations import formation_rows
+from cfplan_core.planning.equations import formation_rows, is_second_order
 from cfplan_core.planning.goal_limits import why_impossible
 from cfplan_core.planning.goal_test import GoalTest
 from cfplan_core.planning.grasp_check import ExaminedProblem, examine_problem
@@ -40,8 +40,6 @@ from cfplan_core.trajectory.frames import build_frames, overloaded_legs, strayin
 from cfplan_core.trajectory.inspection import flaw
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
 
-# Hands of which more joints move are planned for by drives rather than piece by piece.
-_MOST_JOINTS_SEARCHED = 2
 # So many searches are made for each plan wanted where plans are compared and no budget is given.
 _SEARCHES = 6
 
@@ -63,7 +61,7 @@ class Progress:
     message: str
 
 
-# Hands that everything is explored for.
+# With more joints the search samples; with up to so many it is complete.
 MOST_JOINTS = 2
 TOO_WEAK = 'a joint would exceed its effort limit'
 
@@ -144,8 +142,8 @@ class _Planning:
         if impossible:
             return self._answer(Status.INFEASIBLE, f'no path: {impossible}')
         try:
-            if self.moving.joint_count > _MOST_JOINTS_SEARCHED:
-                return self._search_samples(start, goals[-1])
+            if self.moving.joint_count > MOST_JOINTS and not _held_by_two(examined):
+                return self._search_samples(start, goals[0])
             if self.options.optimal:
                 exact = self.options.alternatives == 1 and self.moving.joint_count <= MOST_JOINTS
                 search = self._search_all if exact else self._search_best
@@ -166,6 +164,9 @@ class _Planning:
         if legs is None:
             nearest = goals[-1].how_near() if isinstance(goals[-1], GoalTest) else ''
             message = f'no path{nearest}; {self._explored()}{self._doubt()}'
+            if self.moving.joint_count > MOST_JOINTS:
+                message += '. Rays do not show that there is no plan'
+                return self._answer(Status.BUDGET_EXHAUSTED, message)
             return self._answer(Status.INFEASIBLE, message)
         return self._solved(legs, '')
 
@@ -469,7 +470,7 @@ class _Planning:
         if not isinstance(self.search, SampledSearch):
             return ''
         return (
-            f'. With more than {_MOST_JOINTS_SEARCHED} joints the search samples: it pushed along '
+            f'. With more than {MOST_JOINTS} joints the search samples: it pushed along '
             f'{self.search.drives} drives, seed {self.options.seed}, which does not show that '
             'there is no plan'
         )
@@ -525,3 +526,9 @@ class _Planning:
             )
             for node in tree.nodes
         )
+
+
+def _held_by_two(examined: ExaminedProblem) -> bool:
+    """Tell whether two contacts hold the start or the goal: sampling finds no way from there."""
+    grasps = [grasp for grasp in (examined.start, examined.goal) if grasp is not None]
+    return any(is_second_order(grasp.pairs) for grasp in grasps)

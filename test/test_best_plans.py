@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from random_problems import distant_goal, explore, random_problem
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -232,3 +233,14 @@ def test_an_unknown_preference_is_refused() -> None:
 def test_no_alternatives_at_all_are_refused() -> None:
     with pytest.raises(CfplanError, match='alternatives: got 0'):
         PlanOptions(alternatives=0)
+
+
+@pytest.mark.parametrize('seed', [2, 8])
+def test_the_shortest_plan_of_a_random_problem_is_no_longer_than_the_first(seed: int) -> None:
+    start = random_problem(seed)
+    problem = distant_goal(start, explore(start, 60), seed)
+    assert problem is not None
+    first = plan(problem)
+    shortest = plan(problem, PlanOptions(prefer=Preference.SHORTEST, second_order=False))
+    assert verify_plan(problem, shortest).failures == ()
+    assert shortest.length <= first.length + 1e-9

@@ -9,12 +9,14 @@ from functools import cache
 import numpy as np
 import pytest
 from planning.scenes import FEET, TABLE, TIPS, finger, pushed_angles, pushed_block
+from planning.test_other_hands import four_joints
 from random_problems import distant_goal, explore, random_problem
 from scipy.optimize import brentq
 
 from cfplan_core import PlanOptions, PlanResult, Status, plan, verify_plan
 from cfplan_core.exploration import explore as explore_completely
 from cfplan_core.model import Goal, Grasp, Hand, ManipulatedObject, Problem, Tolerance
+from cfplan_core.planning.grasp_check import describe_grasp
 from cfplan_core.planning.sheet_graph import Sheet
 
 LENGTH, THICKNESS = 0.06, 0.004
@@ -200,6 +202,17 @@ def test_part_of_a_goal_that_can_be_reached_is_reached(seed: int, parts: set[str
     solved(replace(problem, goal=Goal(**{part: known[part] for part in parts})))
 
 
+def test_alternatives_do_not_end_a_hair_beside_another_contact() -> None:
+    """The start lies flush on the palm, as wanted; regions begin beside it."""
+    problem = random_problem(1)
+    goal = Goal(orientation=0.0, tolerance=Tolerance(angle=0.02))
+    problem = replace(problem, goal=goal)
+    result = solved(problem, PlanOptions(prefer='shortest', alternatives=3))
+    assert len(result.alternatives) == 2
+    for other in result.alternatives:
+        assert verify_plan(problem, other).failures == ()
+
+
 @pytest.mark.parametrize('seed', [1, 16])
 def test_orientation_on_any_sheet_is_reached_in_its_contact_formation(seed: int) -> None:
     """The formations of three contacts have two dimensions: a level set of the angle."""
@@ -228,3 +241,27 @@ def test_position_of_a_frame_that_is_not_the_centre_of_mass_is_reached() -> None
     assert pose is not None
     result = solved(replace(far, goal=Goal(position=pose[:2])))
     assert math.dist(result.object_poses[-1, :2], pose[:2]) <= 1e-4
+
+
+# With more joints.
+
+
+def test_start_that_fulfils_a_goal_in_part_is_the_whole_plan_of_four_joints() -> None:
+    problem = four_joints((0.0, 0.0, 0.0))
+    contacts = describe_grasp(problem, problem.start).contacts
+    goal = Goal(contacts=contacts, exact_contacts=True)
+    result = solved(replace(problem, goal=goal))
+    assert not np.ptp(result.joints, axis=0).any()
+
+
+@pytest.mark.parametrize(
+    'goal',
+    [
+        Goal(position=(0.0005, 0.0)),
+        Goal(orientation=0.02, tolerance=Tolerance(angle=0.005)),
+        Goal(joints={'thumb_0': 1.42}, tolerance=Tolerance(joints=0.005)),
+    ],
+    ids=['position', 'orientation', 'joint'],
+)
+def test_four_joints_reach_a_goal_in_part(goal: Goal) -> None:
+    solved(replace(four_joints((0.0, 0.0, 0.0)), goal=goal), PlanOptions(time_budget=60.0))

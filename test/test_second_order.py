@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from planning.pegs import HALF, WIDTH, cradle, formation, lowest_nearby, swing, two_fingers
+from planning.pegs import HALF, WIDTH, cradle, finger, formation, lowest_nearby, swing, two_fingers
 
 from cfplan_core import (
     PlanOptions,
@@ -207,6 +207,44 @@ def test_bar_swings_down_as_its_wall_turns(seam: float | None) -> None:
     assert [s.stability for s in result.segments] == ['second_order'] * (1 if seam is None else 2)
     report = verify_plan(problem, result)
     assert report.ok, report.failures
+
+
+@pytest.mark.parametrize('prefer', ['first', 'shortest'])
+@pytest.mark.parametrize('turn', [0.3, -0.4])
+def test_orientation_alone_is_reached_on_two_fingers(turn: float, prefer: str) -> None:
+    problem = two_fingers(())
+    start = symmetric(problem, 0.0)
+    problem = replace(problem, start=start, goal=Goal(orientation=turn))
+    result = plan(problem, PlanOptions(prefer=prefer))
+    assert result.solved, result.message
+    assert result.object_poses[-1, 2] == pytest.approx(turn, abs=1e-3)
+    report = verify_plan(problem, result)
+    assert report.ok, report.failures
+
+
+def test_goal_of_exactly_two_contacts_is_reached_by_letting_the_ledge_go() -> None:
+    pair = ('object.e2|palm.0.v2', 'object.e3|finger.link.v1')
+    problem = replace(LEDGES, goal=Goal(contacts=pair, exact_contacts=True))
+    result = plan(problem)
+    assert result.solved, result.message
+    assert result.segments[-1].contacts == pair
+    assert verify_plan(problem, result).ok
+
+
+@pytest.mark.parametrize('prefer', ['first', 'shortest'])
+def test_hand_of_three_joints_moves_what_two_of_its_fingers_hold(prefer: str) -> None:
+    problem = two_fingers(())
+    far = finger('far', (0.3, 0.0))
+    start, goal = (
+        Grasp(grasp.object_pose, (*grasp.joints, angle))
+        for grasp, angle in ((symmetric(problem, 0.0), 1.0), (symmetric(problem, 0.004), 1.2))
+    )
+    hand = replace(problem.hand, fingers=(*problem.hand.fingers, far))
+    problem = moved(replace(problem, hand=hand), start, goal)
+    result = plan(problem, PlanOptions(prefer=prefer))
+    assert result.solved, result.message
+    assert {segment.stability for segment in result.segments} == {'second_order'}
+    assert verify_plan(problem, result).ok
 
 
 def test_held_finger_leaves_a_curve() -> None:

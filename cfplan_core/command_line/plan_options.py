@@ -131,7 +131,7 @@ def wanted_plan(command: Command) -> Command:
         second_order_option,
         click.option(
             '--seed',
-            type=click.IntRange(min=0),
+            type=click.IntRange(0, 2**32 - 1),
             default=0,
             metavar='N',
             help='Draw from another generator, for hands of more than two joints.',

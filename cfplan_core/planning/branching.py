@@ -55,6 +55,7 @@ def branches(
     """Ways out of a configuration, the one that serves the drive best first."""
     found: dict[tuple[int, ...], Branch] = {}
     for kept in _stable_choices(around, tracer):
+        tracer.checkpoint()
         branch = _branch(around, tracer, helm, drive, kept, keep_on_edges, failures)
         if branch is not None:
             key = branch.departure.formation.pairs

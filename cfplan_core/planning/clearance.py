@@ -52,7 +52,7 @@ class Clearance:
             concerned &= (moved | seconds)[vertex_body] & (moved | seconds)[edge_body]
             concerned &= seconds[vertex_body] | seconds[edge_body]
         if alone:
-            strange: BoolArray = system.moves.any(axis=1) & ~moved
+            strange: BoolArray = np.asarray(system.moves.any(axis=1) & ~moved)
             concerned &= ~(strange[vertex_body] | strange[edge_body])
         chosen = np.flatnonzero(concerned)
         low = np.minimum(vertex_body, edge_body)[chosen]

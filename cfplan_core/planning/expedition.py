@@ -22,7 +22,10 @@ from cfplan_core.contact.system import IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.planning.drives import Drive, ToConfiguration
+from cfplan_core.planning.force_drive import ToForce
+from cfplan_core.planning.goal_contacts import contact_drive
 from cfplan_core.planning.goal_test import GoalTest
+from cfplan_core.planning.joining import Joining, SamePieces
 from cfplan_core.planning.milestones import Growth, Milestone, Stretch
 from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.placing import placements
@@ -39,8 +42,14 @@ _JOINT = 0.1
 _TRIED = 0.15
 # Joined if a push ends this near to a configuration of the other tree.
 _MET = 1e-7
+# Drives, for each joint, after which the search begins anew with other luck, and how many more
+# those are next time.
+_PATIENCE = 60.0
+_GROWTH_OF_PATIENCE = 1.5
 # Poses of the object, in radians and object sizes, that count as the same.
 _SAME_POSE = 1e-8
+# Part of the drives to a pose that are to an angle alone.
+_TURNS = 0.5
 # Fingers are moved one by one where the object's poses differ by no more than this.
 _GAIT = 0.5
 # How much farther away a configuration counts for every body that touches in one only.
@@ -89,7 +98,6 @@ class Expedition:
         self._rng = np.random.default_rng(seed)
         self._most_drives = most_drives
         self.drives = 0
-        self.meeting: int | None = None
         self._test = goal if isinstance(goal, GoalTest) else None
         refusal = roadmap.constraints.refusal
         self._pusher = Pusher(roadmap.tracer, roadmap.failures, self._region_of, refusal)
@@ -100,34 +108,56 @@ class Expedition:
             start,
             start if isinstance(goal, GoalTest) else goal,
             self._rng,
+            roadmap.tracer.checkpoint,
         )
-        roots = [start] if isinstance(goal, GoalTest) else [start, goal]
-        self._growths = [Growth() for _ in roots]
-        for growth, root in zip(self._growths, roots, strict=True):
-            milestone = Milestone(root, surroundings(self._system, root), None, ())
-            growth.add(milestone, self._bodies(milestone))
+        self._roots = [start] if isinstance(goal, GoalTest) else [start, goal]
+        self._seed = seed
+        self._growths: list[Growth] = []
+        self._begin()
         self._met: tuple[Milestone, Milestone] | None = None
         self._scale = np.ones(self._system.dof)
         self._scale[3:] = _JOINT
 
+    def _begin(self) -> None:
+        """Begin with trees of one configuration."""
+        self._joining = Joining(self._roadmap.tracer, self._region_of, self._seed)
+        self._growths = [Growth() for _ in self._roots]
+        for growth, root in zip(self._growths, self._roots, strict=True):
+            milestone = Milestone(root, surroundings(self._system, root), None, ())
+            growth.add(milestone, self._bodies(milestone))
+
     @property
     def trees(self) -> tuple[Tree, Tree]:
         """The CF-trees, for pictures and statistics."""
-        trees = [_cf_tree(growth) for growth in self._growths]
+        same = self._joining.same
+        trees = [_cf_tree(growth, same) for growth in self._growths]
         if len(trees) < 2:
             trees.append(Tree(trees[0].root))
-        if self._met is not None:
-            last = self._met[0].stretches[-1].region if self._met[0].stretches else None
-            if last is not None and last.index not in trees[1].index_of:
+        if self._met is not None and self.meeting is not None:
+            last = self._roadmap.pieces[self.meeting]
+            if last.index not in trees[1].index_of:
                 trees[1].add(Node(last, 0 if trees[1].nodes else None, self._met[0].z, 1))
         return trees[0], trees[1]
 
+    @property
+    def meeting(self) -> int | None:
+        """See the class; a piece that the initial tree reached last."""
+        if self._met is None or not self._met[0].stretches:
+            return None
+        return self._joining.same.of(self._met[0].stretches[-1].region).index
+
     def run(self) -> bool:
         """Grow until the trees meet (true) or the drives are used up (false)."""
-        if len(self._growths) > 1 and self._arrived(0, self._growths[0].milestones[0]):
+        if self._arrived(0, self._growths[0].milestones[0]):
             return True
         turn = 0
+        patience = _PATIENCE * self._system.joint_count
+        restart = patience
         while self._met is None and self.drives < self._most_drives:
+            if self.drives >= restart:
+                patience *= _GROWTH_OF_PATIENCE
+                restart = self.drives + patience
+                self._begin()
             side = turn % len(self._growths)
             turn += 1
             growth = self._growths[side]
@@ -152,6 +182,7 @@ class Expedition:
         counts[side] += 1
         self._grown(counts[0], counts[1])
         self._growths[side].add(reached, self._bodies(reached))
+        self._joining.add(side, reached)
 
     def _bodies(self, milestone: Milestone) -> tuple[int, ...]:
         """Bodies of the hand that touch the object."""
@@ -167,9 +198,14 @@ class Expedition:
         other = self._growths[1 - side]
         off = np.abs(other.table - reached.z).max(axis=1)
         nearest = int(np.argmin(off))
-        if off[nearest] > _MET:
-            return False
-        pair = (reached, other.milestones[nearest])
+        if off[nearest] <= _MET:
+            pair = (reached, other.milestones[nearest])
+        else:
+            joined = self._joining.join(side, reached)
+            if joined is None:
+                return False
+            self._add(side, joined[0])
+            pair = joined
         self._met = pair if side == 0 else (pair[1], pair[0])
         return True
 
@@ -259,6 +295,10 @@ class Expedition:
                 weights = np.zeros(system.dof)
                 weights[self._test.region.columns] = 1.0
                 begin = self._nearest(growth, wanted, weights * self._scale)
+                if kind < 0.25 or not self._test.region.count:
+                    contact = contact_drive(system, self._test, begin, rng)
+                    if contact is not None:
+                        return begin, contact, True
                 return begin, ToConfiguration(wanted, weights, free), on_edges
             return begin, ToConfiguration(wanted, _pose_weights(system.dof), free), on_edges
         begin = self._promising(side)
@@ -267,12 +307,17 @@ class Expedition:
             roots = [growth.table[0] for growth in self._growths]
             between = roots[0] + rng.random() * (roots[-1] - roots[0])
             wanted[:3] = between[:3] + rng.normal(size=3) * [0.2, 0.2, 0.3]
-            begin = self._nearest(growth, wanted, _pose_weights(system.dof))
-            return begin, ToConfiguration(wanted, _pose_weights(system.dof), free), on_edges
+            weights = _pose_weights(system.dof)
+            if rng.random() < _TURNS:
+                weights[:2] = 0.0
+            begin = self._nearest(growth, wanted, weights)
+            return begin, ToConfiguration(wanted, weights, free), on_edges
         if kind < 0.8:
             drive = placements(system, begin, rng)
             if drive is not None:
                 return begin, drive, True
+            if len(begin.around.pairs) > 2:
+                return begin, self._unloading(begin), True
         wanted = begin.z.copy()
         fingers = self._fingers()
         columns = fingers[int(rng.integers(len(fingers)))]
@@ -285,6 +330,13 @@ class Expedition:
         if rng.random() < 0.5:
             weights[:3] = 1.0
         return begin, ToConfiguration(wanted, weights, free), on_edges
+
+    def _unloading(self, begin: Milestone) -> ToForce:
+        """Draw a contact that touches, to be let go, from one where no link is free to touch."""
+        pairs = tuple(int(pair) for pair in begin.around.pairs)
+        pair = pairs[int(self._rng.integers(len(pairs)))]
+        system, model = self._system, self._roadmap.model
+        return ToForce(system, model, system.load, Formation(pairs), pair)
 
     def _fingers(self) -> list[IntArray]:
         """Columns of z of each finger's joints; not of fingers all of whose joints are held."""
@@ -418,20 +470,23 @@ def _length(stops: Sequence[Stop]) -> float:
     )
 
 
-def _cf_tree(growth: Growth) -> Tree:
+def _cf_tree(growth: Growth, same: SamePieces) -> Tree:
     """Regions of a tree in the order of discovery, each below that it was entered from."""
     root = growth.milestones[0]
     tree = Tree(root.z)
     for milestone in growth.milestones[1:]:
         assert milestone.parent is not None
-        above = milestone.parent.stretches[-1].region.index if milestone.parent.stretches else None
+        above = (
+            same.of(milestone.parent.stretches[-1].region) if milestone.parent.stretches else None
+        )
         for stretch in milestone.stretches:
-            if stretch.region.index not in tree.index_of:
-                parent = tree.index_of.get(above) if above is not None else None
+            region = same.of(stretch.region)
+            if region.index not in tree.index_of:
+                parent = tree.index_of.get(above.index) if above is not None else None
                 if parent is None and tree.nodes:
                     parent = 0
                 depth = 0 if parent is None else tree.nodes[parent].depth + 1
                 entry = None if parent is None else stretch.points[0]
-                tree.add(Node(stretch.region, parent, entry, depth))
-            above = stretch.region.index
+                tree.add(Node(region, parent, entry, depth))
+            above = region
     return tree

@@ -7,6 +7,8 @@ tested for clearance only; whoever follows the way has the last word.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from cfplan_core.contact.gaps import gap_gradients
@@ -27,13 +29,20 @@ _SHORTCUTS = 12
 class FreeMotion:
     """Ways of one finger's joints through free space."""
 
-    def __init__(self, system: ContactSystem, joints: IntArray) -> None:
+    def __init__(
+        self,
+        system: ContactSystem,
+        joints: IntArray,
+        checkpoint: Callable[[], None] = lambda: None,
+    ) -> None:
         """Prepare.
 
         Args:
             system: Compiled problem.
             joints: Indices of the finger's joints.
+            checkpoint: Called again and again; may raise to interrupt.
         """
+        self._checkpoint = checkpoint
         self._system = system
         self.joints = joints
         self._alone = Clearance(system, joints, alone=True)
@@ -151,6 +160,7 @@ class FreeMotion:
         samples = 0
         while not met and samples < most:
             samples += 1
+            self._checkpoint()
             wanted = rng.uniform(self._lower, self._upper)
             extend(side, wanted, _STEP)
             met = extend(1 - side, trees[side][-1], np.inf)

@@ -40,16 +40,6 @@ class GoalTest:
         self.nearest: FloatArray | None = None
         self._least = np.inf
 
-    @property
-    def columns(self) -> IntArray:
-        """Coordinates of z that the goal gives, shape (m,)."""
-        return self.region.columns
-
-    @property
-    def wanted(self) -> FloatArray:
-        """Their values, shape (m,)."""
-        return self.region.wanted
-
     def __call__(self, piece: Piece) -> FloatArray | None:
         """Return the configuration of a point or a curve, shape (3 + n,), nearest to the goal.
 
@@ -145,6 +135,10 @@ class GoalTest:
     def has_contacts(self, pairs: Iterable[int]) -> bool:
         """Tell whether contacts that touch are those wanted."""
         return self.region.holds(pairs)
+
+    def missing(self, pairs: IntArray) -> list[int]:
+        """List the contacts wanted that are not among pairs, shape (k,)."""
+        return sorted(self.region.pairs - set(pairs.tolist()))
 
     def fits(self, z: FloatArray) -> bool:
         """Tell whether a configuration has the coordinates wanted, within their tolerances."""

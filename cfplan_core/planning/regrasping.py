@@ -8,6 +8,7 @@ where a finger finds no way.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import combinations
 
 import numpy as np
@@ -50,8 +51,20 @@ class Regrasping:
         begin: FloatArray,
         end: FloatArray,
         rng: np.random.Generator,
+        checkpoint: Callable[[], None] = lambda: None,
     ) -> None:
-        """Prepare for one system and for motions of the object between two configurations."""
+        """Prepare.
+
+        Args:
+            system: Compiled problem.
+            model: Judges stability.
+            pusher: Follows motions.
+            begin: Configuration that the object begins in, shape (3 + n,).
+            end: Configuration that it ends in, shape (3 + n,).
+            rng: To draw from.
+            checkpoint: Called again and again; may raise to interrupt.
+        """
+        self._checkpoint = checkpoint
         self._system = system
         self._model = model
         self._pusher = pusher
@@ -64,7 +77,8 @@ class Regrasping:
         for index, joints in enumerate(joints for joints in system.finger_joints if len(joints)):
             moved = system.moves[system.pair_body[: system.contact_count]][:, joints].any(axis=1)
             self._finger_of[moved] = index
-            self._motions.append(FreeMotion(system, joints))
+            checkpoint()
+            self._motions.append(FreeMotion(system, joints, checkpoint))
             self._touching.append(TouchingPostures(system, joints))
             self._parked.append(parked_postures(system, joints, begin, end, _PARKED, rng))
         self._between = {
@@ -116,6 +130,7 @@ class Regrasping:
 
     def _places(self, begin: Milestone, end: Milestone, finger: int) -> list[Place]:
         """Where a finger may be: as in the first grasp, the last one, parked, elsewhere."""
+        self._checkpoint()
         columns = self._motions[finger].columns
         places = []
         for grasp in (begin, end):
@@ -191,6 +206,7 @@ class Regrasping:
 
     def _holds(self, gradients: FloatArray) -> bool:
         """Tell whether contacts with gradients of shape (k, 3 + n) hold the object well."""
+        self._checkpoint()
         if len(gradients) < 3:
             return False
         return bool(self._model.margins(gradients[None]).stable[0] > _HELD)

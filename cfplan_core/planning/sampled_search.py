@@ -21,6 +21,8 @@ from cfplan_core.planning.search import Leg, Tree
 
 # Orders of required formations that are tried, one for each seed.
 _MOST_ORDERS = 24
+# So many paths in turn that cannot be used end the search.
+_MOST_REFUSED = 20
 
 
 class SampledSearch:
@@ -85,13 +87,20 @@ class SampledSearch:
         """Paths from start to goal, each by a search with another seed; there is no last one.
 
         Raises:
-            BudgetExhaustedError: A search gave up, or its checkpoint raised this.
+            BudgetExhaustedError: A search gave up, path after path was refused, or the checkpoint
+                raised this.
         """
+        refused = 0
         for attempt in count():
             self.attempts += 1
             legs = self._attempt(attempt)
             if not self._refuse(legs):
+                refused = 0
                 yield legs
+            else:
+                refused += 1
+                if refused == _MOST_REFUSED:
+                    raise BudgetExhaustedError(f'{refused} paths in turn could not be used')
 
     def _attempt(self, attempt: int) -> list[Leg]:
         """One path from start to goal."""

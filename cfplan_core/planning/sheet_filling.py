@@ -21,6 +21,8 @@ _SAME = 1e-5
 _FEW = 100
 # With more vertices at a finer level than the first, a sheet is continued at a coarser one.
 _MANY = 400
+# Finer steps around a vertex with borders near on both sides.
+_RINGS = 4
 
 
 @dataclass(eq=False)
@@ -71,7 +73,7 @@ def fill(tracer: Tracer, grid: JointGrid, table: Table, patch: Sheet, level: int
     """Find all of a sheet that grid steps reach from a vertex.
 
     A sheet with few vertices is filled again at finer levels; one with many at a fine level is
-    continued at coarser ones.
+    continued at coarser ones. Where borders are near on both sides it is filled finer.
 
     Args:
         tracer: Knows system and model.
@@ -102,6 +104,9 @@ class _Filling:
         # Steps taken, by vertex, joint and number of lines; and those that met something.
         self.done: set[tuple[int, int, int]] = set()
         self.stopped: list[_Step] = []
+        # Steps that led to a vertex, and vertices that were looked around, by level.
+        self.led: set[tuple[int, int, int]] = set()
+        self.looked: set[tuple[int, int]] = set()
         self.join: tuple[int, Sheet, int, FloatArray] | None = None
 
     def run(self, level: int) -> Sheet:
@@ -133,7 +138,7 @@ class _Filling:
             elif self.stopped:
                 refining = False
                 self._look_closer()
-            else:
+            elif not self._look_between(level):
                 return self.sheet
 
     def _lies_on_lines(self, vertex: int, stride: int) -> bool:
@@ -182,6 +187,44 @@ class _Filling:
             else:
                 self.sheet.losses.append((step[0], angles))
 
+    def _look_between(self, level: int) -> bool:
+        """Fill finer where borders are near on both sides; tell whether there is more to do then.
+
+        A neck may lead on from there between the lines.
+        """
+        count = len(self.sheet.vertices)
+        for finer in range(level + 1, self.grid.levels):
+            coarse = self.grid.stride(finer - 1)
+            tips = [
+                vertex
+                for vertex in range(len(self.sheet.vertices))
+                if (vertex, finer) not in self.looked and self._is_pinched(vertex, coarse)
+            ]
+            self.looked.update((vertex, finer) for vertex in tips)
+            self.front = tips
+            for _ in range(_RINGS):
+                if self.front and self.join is None:
+                    self.tracer.checkpoint()
+                    self._step(self._open_steps(self.grid.stride(finer)))
+        stride = self.grid.stride(level)
+        new = range(count, len(self.sheet.vertices))
+        self.front = [vertex for vertex in new if self._lies_on_lines(vertex, stride)]
+        return bool(self.front or self.stopped or self.join is not None)
+
+    def _is_pinched(self, vertex: int, lines: int) -> bool:
+        """Tell whether steps of some joint both up and down met something, or a limit."""
+        place = self.sheet.places[vertex]
+        assert place is not None
+        for joint in range(len(place)):
+            steps = [(vertex, joint, way) for way in (-lines, lines)]
+            if any(step in self.led for step in steps):
+                continue
+            met = [step in self.done for step in steps]
+            beyond = [self.grid.neighbour(place, joint, way) is None for way in (-lines, lines)]
+            if any(met) and all(m or b for m, b in zip(met, beyond, strict=True)):
+                return True
+        return False
+
     def _ends(self, steps: list[_Step]) -> tuple[FloatArray, FloatArray]:
         """Where steps begin, shape (m, 3 + n), and the joint angles they lead to, (m, n)."""
         starts = np.array([self.sheet.vertices[vertex] for vertex, _, _, _ in steps])
@@ -213,3 +256,4 @@ class _Filling:
             return
         self.sheet.connect(vertex, reached, between)
         self.done.add((reached, joint, -lines))
+        self.led |= {(vertex, joint, lines), (reached, joint, -lines)}

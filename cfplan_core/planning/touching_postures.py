@@ -12,12 +12,17 @@ from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.clearance import Clearance
 
 # Postures that are drawn, and how many links may touch, the last ones.
-_DRAWN = 120
+_DRAWN = 200
 _LINKS = 2
 # Distance that is kept from everything else and from ends of edges, in object sizes.
 _KEPT = 0.004
 _INSIDE = 0.02
-_ITERATIONS = 8
+_ITERATIONS = 14
+# The last of them close the gap alone.
+_LAST = 5
+_DAMPING = 1e-9
+# How much, in object sizes, luck counts beside nearness.
+_LUCK = 0.3
 _LONGEST_STEP = 0.4
 _TOUCHING = 1e-10
 _SPREAD = 0.5
@@ -76,16 +81,15 @@ class TouchingPostures:
         angles[near] += rng.normal(size=(len(near), len(lower))) * _SPREAD
         points = np.tile(z, (_DRAWN, 1))
         points[:, self._columns] = np.clip(angles, lower, upper)
-        luck = rng.random((_DRAWN, len(self._pairs)))
-        length = system.pair_length[self._pairs]
-        gap, offset = gaps(system, system.place(points), self._pairs)
-        inside = (offset > _INSIDE) & (offset < length - _INSIDE)
-        chosen = np.argmin(np.where(inside, np.abs(gap) + 0.3 * luck, np.inf), axis=1)
+        chosen, place = self._wanted(points, rng)
         pairs = self._pairs[chosen]
-        for _ in range(_ITERATIONS):
-            placed = system.place(points)
-            gap, rows = self._off(placed, pairs)
-            step = rows * (gap / np.maximum((rows**2).sum(axis=1), 1e-3))[:, None]
+        for left in range(_ITERATIONS, 0, -1):
+            off, rows = self._off(system.place(points), pairs, place)
+            if left <= _LAST:
+                # Where along the edge does not matter in the end.
+                off[:, 1], rows[:, 1] = 0.0, 0.0
+            square = rows @ rows.transpose(0, 2, 1) + _DAMPING * np.eye(2)
+            step = (rows.transpose(0, 2, 1) @ np.linalg.solve(square, off[..., None]))[..., 0]
             largest = np.abs(step).max(axis=1, keepdims=True)
             points[:, self._columns] -= step * np.minimum(
                 1.0, _LONGEST_STEP / np.maximum(largest, 1e-12)
@@ -97,15 +101,43 @@ class TouchingPostures:
             gradients[k] = gap_gradients(system, system.place(point[None]), pair[None])[0, 0]
         return Postures(points[:, self._columns], pairs, gradients)
 
-    def _off(self, placed: Placement, pairs: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Gap of one pair in each configuration, shape (s,), and its gradient, (s, j)."""
+    def _wanted(self, points: FloatArray, rng: np.random.Generator) -> tuple[IntArray, FloatArray]:
+        """Choose a contact for each posture, and where on its edge, NaN for anywhere.
+
+        One half of the postures is to make a contact that is near, the other half any.
+        """
+        system, length = self._system, self._system.pair_length[self._pairs]
+        gap, offset = gaps(system, system.place(points), self._pairs)
+        inside = (offset > _INSIDE) & (offset < length - _INSIDE)
+        far = np.abs(gap) + _LUCK * rng.random(gap.shape)
+        chosen = np.argmin(np.where(inside, far, np.inf), axis=1)
+        place = np.full(len(points), np.nan)
+        anywhere = ~inside.any(axis=1)
+        anywhere[::4] = anywhere[1::4] = True
+        count = int(anywhere.sum())
+        chosen[anywhere] = rng.integers(len(self._pairs), size=count)
+        place[anywhere] = length[chosen[anywhere]] * rng.uniform(0.05, 0.95, count)
+        return chosen, place
+
+    def _off(
+        self, placed: Placement, pairs: IntArray, place: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Gap of one pair in each configuration and its distance from a place on the edge.
+
+        Returns:
+            Values, shape (s, 2), and their gradients, shape (s, 2, j).
+        """
         system, every = self._system, np.arange(len(pairs))
         vertex, edge = system.pair_vertex[pairs], system.pair_edge[pairs]
         point, normal = placed.vertices[every, vertex], placed.normals[every, edge]
-        gap = (normal.conj() * (point - placed.vertices[every, edge])).real
+        local = normal.conj() * (point - placed.vertices[every, edge])
         reach = point[:, None] - placed.axes[:, self._joints]
-        moves = system.pair_moves[pairs][:, self._joints]
-        return gap, moves * (reach.conj() * normal[:, None]).imag
+        turning = system.pair_moves[pairs][:, self._joints] * reach.conj()
+        free = np.isnan(place)
+        off = np.stack([local.real, np.where(free, 0.0, local.imag - place)], axis=1)
+        across = (turning * normal[:, None]).imag
+        along = np.where(free[:, None], 0.0, (turning * 1j * normal[:, None]).imag)
+        return off, np.stack([across, along], axis=1)
 
     def _good(
         self, points: FloatArray, chosen: IntArray, lower: FloatArray, upper: FloatArray

@@ -9,6 +9,7 @@ import pytest
 
 from cfplan_core import PlanOptions, PlanResult, Status, load_problem, plan
 from cfplan_core.model import Problem
+from cfplan_core.planning import expedition
 from cfplan_core.verification import verify_plan
 
 PROBLEMS = sorted(
@@ -46,6 +47,16 @@ def test_plan_is_the_same_on_every_run() -> None:
     again = plan(problem)
     np.testing.assert_array_equal(again.joints, result.joints)
     assert again.segments == result.segments
+
+
+def test_search_that_began_anew_is_solved_and_certified(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(expedition, '_PATIENCE', 0.5)
+    path = next(path for path in PROBLEMS if path.stem == 'two_fingers_two_joints')
+    problem, first = planned(path)
+    result = plan(problem)
+    assert result.solved, result.message
+    assert not np.array_equal(result.joints, first.joints)
+    assert verify_plan(problem, result).failures == ()
 
 
 def test_time_budget_is_kept() -> None:

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import threading
+from collections import Counter
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -30,17 +31,25 @@ from cfplan_core.contact.elements import parse_contact
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.held import HeldSystem
 from cfplan_core.contact.system import ContactSystem
+from cfplan_core.mechanics.contact_model import Stability
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Grasp
 from cfplan_core.planning.budget import BudgetExhaustedError
+from cfplan_core.planning.drives import ToConfiguration
 from cfplan_core.planning.efforts import within_efforts
 from cfplan_core.planning.grasp_check import examine_problem
+from cfplan_core.planning.milestones import Milestone
+from cfplan_core.planning.pieces import Region
+from cfplan_core.planning.pushing import Pusher, Refusal
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.sampled_search import SampledSearch
 from cfplan_core.planning.search import Leg
+from cfplan_core.planning.tracing import Tracer
+from cfplan_core.planning.transitions import surroundings
 
 ROOT = Path(__file__).parents[2]
 PATH = ROOT / 'config' / 'problems' / 'many_joints' / 'two_fingers_two_joints.yaml'
+TIP = 'object.e2|right.link_2.v2'
 
 
 @cache
@@ -92,22 +101,56 @@ def test_seed_below_zero_is_refused(seed: int) -> None:
         PlanOptions(seed=seed)
 
 
+def tip_on_edge() -> Problem:
+    """A goal that is near: the right fingertip comes to lie on an edge of the object."""
+    return replace(problem(), goal=Goal(contacts=(TIP,)))
+
+
 def test_constraints_hold_all_the_way() -> None:
-    first = certified(PlanOptions())
-    ends = {*first.segments[0].contacts, *first.segments[-1].contacts}
-    passing = next(c for s in first.segments for c in s.contacts if c not in ends)
-    low, high = np.array([-0.075, -0.01]), np.array([0.043, 0.08])
+    free = plan(tip_on_edge())
+    bound = 0.9 * worst_force(free)
+    reached = free.object_poses[:, 0]
+    low = np.array([reached.min() - 0.045, -0.01])
+    high = np.array([reached.max() + 0.045, 0.08])
     corners = ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))
-    options = PlanOptions(max_needed_force=12.0, forbidden=((passing,),), stay_within=corners)
-    result = certified(options)
-    assert worst_force(result) <= 12.0
-    assert not any(passing in segment.contacts for segment in result.segments)
+    result = plan(tip_on_edge(), PlanOptions(max_needed_force=bound, stay_within=corners))
+    assert result.solved, result.message
+    assert verify_plan(tip_on_edge(), result).failures == ()
+    assert worst_force(result) <= bound
     vertices = problem().object.vertices
     for x, y, phi in result.object_poses:
         turn = np.array([[np.cos(phi), np.sin(phi)], [-np.sin(phi), np.cos(phi)]])
         world = vertices @ turn + (x, y)
         assert (world >= low - 1e-9).all()
         assert (world <= high + 1e-9).all()
+
+
+def test_pushes_end_before_what_is_refused() -> None:
+    system = ContactSystem(problem())
+    tracer = Tracer(system, FrictionlessModel(system.load))
+    start = examine_problem(system, tracer.model).start
+    assert start is not None
+    root = Milestone(start.z, surroundings(system, start.z), None, ())
+
+    def region(known: list[Region], of: Formation, stability: Stability) -> Region:
+        return Region(0, of, stability, 2, start.z[None], (), [])
+
+    def most(refusal: Refusal) -> tuple[int, int]:
+        """Most contacts at the ends of random pushes, and how many got anywhere."""
+        pusher = Pusher(tracer, Counter(), region, refusal)
+        rng = np.random.default_rng(0)
+        weights = np.ones(system.dof)
+        counts = []
+        for _ in range(12):
+            wanted = root.z + rng.normal(size=system.dof) * 0.4
+            drive = ToConfiguration(wanted, weights, None)
+            counts += [len(m.around.pairs) for m in pusher.push(root, drive, False)]
+        return max(counts), len(counts)
+
+    largest, _ = most(lambda pairs, together: None)
+    bounded, reached = most(lambda pairs, together: 'no' if len(pairs) >= largest else None)
+    assert bounded < largest
+    assert reached > 0
 
 
 def test_held_joint_does_not_move() -> None:
@@ -137,11 +180,16 @@ def test_efforts_of_held_joints_count() -> None:
     assert not within_efforts(held, model, Formation(tuple(pairs)), held.reduced(z)[None])[0]
 
 
-def test_contacts_alone_are_a_goal() -> None:
-    wanted = replace(problem(), goal=Goal(contacts=certified(PlanOptions()).segments[3].contacts))
-    result = plan(wanted)
+def test_contact_that_is_not_made_yet_is_a_goal() -> None:
+    result = plan(tip_on_edge())
     assert result.solved, result.message
-    assert verify_plan(wanted, result).failures == ()
+    assert TIP not in result.segments[0].contacts
+    assert verify_plan(tip_on_edge(), result).failures == ()
+
+
+def test_required_formation_is_passed() -> None:
+    result = certified(PlanOptions(required=((TIP,),)))
+    assert any(TIP in segment.contacts for segment in result.segments)
 
 
 def test_answer_without_a_plan_is_no_proof() -> None:
@@ -160,16 +208,17 @@ def test_cancelled_search_says_so() -> None:
 
 
 def test_alternatives_differ_and_the_best_comes_first() -> None:
-    options = PlanOptions(prefer=Preference.ROBUST, alternatives=2, max_nodes=150)
-    best = certified(options)
+    options = PlanOptions(prefer=Preference.ROBUST, alternatives=2, max_nodes=300)
+    best = plan(tip_on_edge(), options)
+    assert best.solved, best.message
     assert 'a better one may exist' in best.message
     plans = (best, *best.alternatives)
-    margins = [plan_margin(problem(), result) for result in plans]
     assert len(plans) == 2
+    margins = [plan_margin(tip_on_edge(), result) for result in plans]
     assert margins == sorted(margins, reverse=True)
     sequences = {tuple(segment.contacts for segment in result.segments) for result in plans}
     assert len(sequences) == 2
-    assert verify_plan(problem(), plans[1]).failures == ()
+    assert all(verify_plan(tip_on_edge(), result).ok for result in plans)
 
 
 def test_refused_path_is_followed_by_that_of_another_seed() -> None:

@@ -40,6 +40,8 @@ def found(problem: Problem, result: PlanResult) -> str | None:
         result.segments,
         result.entry_lower,
         result.entry_upper,
+        result.torque_nominal,
+        result.entry_nominal,
     )
     return flaw(system, FrictionlessModel(system.load), frames)
 

@@ -100,6 +100,8 @@ def hands(tmp_path: Path) -> Path:
         ('frame_id', 'right_base', 'expected a name that no link or object has'),
         ('default_time_budget', 61.0, 'at most maximal_time_budget, 60 s'),
         ('maximal_time_budget', 1.0, 'at most maximal_time_budget, 1 s'),
+        ('default_preference', 'best', "default_preference: got 'best', expected one of first"),
+        ('default_resolution', 0.0001, 'default_resolution'),
         ('record_directory', '', "record_directory: got ''"),
         ('record_directory', '{}/file', 'expected a directory to write in'),
         ('record_directory', '/proc/runs', 'expected a directory to write in'),
