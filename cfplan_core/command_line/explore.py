@@ -62,7 +62,7 @@ def explore(
     console.print(_table(explored))
     nodes, transitions = len(explored.graph), explored.graph.number_of_edges()
     console.print(f'{nodes} parts of contact formations, {transitions} transitions.')
-    console.print(f'{explored.coverage[0].upper()}{explored.coverage[1:]}.', soft_wrap=True)
+    console.print(f'{explored.coverage[0].upper()}{explored.coverage[1:]}.')
     return 0
 
 
