@@ -61,7 +61,8 @@ def explore(
     console = answers()
     console.print(_table(explored))
     nodes, transitions = len(explored.graph), explored.graph.number_of_edges()
-    console.print(f'{nodes} parts of contact formations, {transitions} transitions.')
+    parts = 'part of a contact formation' if nodes == 1 else 'parts of contact formations'
+    console.print(f'{nodes} {parts}, {transitions} transition{"s" if transitions != 1 else ""}.')
     console.print(f'{explored.coverage[0].upper()}{explored.coverage[1:]}.')
     return 0
 
