@@ -369,9 +369,7 @@ class _Planning:
             return f'{name.value}: the best found so far; {stopped}'
         bound = ''
         if best is not None and best.bound is not None:
-            bound = (
-                f', whose margin is {margin:.3f} where {best.bound:.3f} is the most there can be'
-            )
+            bound = f'; its margin is {margin:.3f}, the largest that can be had {best.bound:.3f}'
         return f'{name.value}: none better exists{bound}; {self.roadmap.regions.coverage()}'
 
     def _refuse(self, legs: Sequence[Leg]) -> list[int]:
@@ -460,9 +458,11 @@ class _Planning:
     def _explored(self) -> str:
         """What was searched, and why it did not lead on."""
         failures = '; '.join(f'{n} × {why}' for why, n in self.roadmap.failures.most_common(5))
+        formations, attempts = self.roadmap.formations(), self.roadmap.attempts
         return (
-            f'explored {self.roadmap.formations()} contact formations by '
-            f'{self.roadmap.attempts} transitions; most frequent failures: {failures or "none"}'
+            f'explored {formations} contact formation{"s" if formations != 1 else ""} by '
+            f'{attempts} transition{"s" if attempts != 1 else ""}; '
+            f'most frequent failures: {failures or "none"}'
         )
 
     def _sampled(self) -> str:
