@@ -149,6 +149,9 @@ class _Planning:
                 search = self._search_all if exact else self._search_best
                 # Best is what is best of all that the goal allows.
                 best = search(start, goals[-1])
+                if best is None and several and self.moving.joint_count == MOST_JOINTS:
+                    self.roadmap = on_sheets
+                    best = self._search_all(start, goals[-1])
                 if best is not None:
                     return best
                 legs = None
@@ -370,7 +373,10 @@ class _Planning:
             bound = (
                 f', whose margin is {margin:.3f} where {best.bound:.3f} is the most there can be'
             )
-        return f'{name.value}: none better exists{bound}; {self.roadmap.regions.coverage()}'
+        others = '; others were looked for along rays' if self.options.alternatives > 1 else ''
+        return (
+            f'{name.value}: none better exists{bound}{others}; {self.roadmap.regions.coverage()}'
+        )
 
     def _refuse(self, legs: Sequence[Leg]) -> list[int]:
         """Which legs cannot be held, with the reasons noted."""

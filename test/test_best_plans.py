@@ -244,3 +244,10 @@ def test_the_shortest_plan_of_a_random_problem_is_no_longer_than_the_first(seed:
     shortest = plan(problem, PlanOptions(prefer=Preference.SHORTEST, second_order=False))
     assert verify_plan(problem, shortest).failures == ()
     assert shortest.length <= first.length + 1e-9
+
+
+def test_no_alternatives_are_a_proof_only_where_regions_were_filled() -> None:
+    problem = load_problem(PROBLEMS / 'existence' / 'barrier_too_low.yaml')
+    result = plan(problem, PlanOptions(alternatives=2))
+    assert result.status is Status.INFEASIBLE
+    assert 'over a grid of joint angles' in result.message
