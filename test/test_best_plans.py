@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from cfplan_core import (
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.mechanics.frictionless import FrictionlessModel
+from cfplan_core.model import Goal
 from cfplan_core.planning.best_first import BestFirst
 from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.pieces import Piece, Region
@@ -251,3 +253,12 @@ def test_no_alternatives_are_a_proof_only_where_regions_were_filled() -> None:
     result = plan(problem, PlanOptions(alternatives=2))
     assert result.status is Status.INFEASIBLE
     assert 'over a grid of joint angles' in result.message
+
+
+def test_a_plan_without_motion_has_no_larger_bound_than_its_margin() -> None:
+    problem = load_problem(PROBLEMS / 'h045.yaml')
+    touching = replace(problem, goal=Goal(contacts=('object.v0|palm.0.e2',)))
+    result = plan(touching, PlanOptions(prefer=Preference.ROBUST, held_joints=('left_joint',)))
+    assert result.solved
+    assert len(result.joints) == 1
+    assert result.margin_bound == result.margin
