@@ -17,7 +17,7 @@ from cfplan_core.model import Goal, Problem
 from cfplan_core.options import PlanOptions as PlanOptions
 from cfplan_core.options import Preference
 from cfplan_core.planning.best_first import BestFirst
-from cfplan_core.planning.best_on_mesh import Best, BestOnMesh
+from cfplan_core.planning.best_on_mesh import PRECISION, Best, BestOnMesh
 from cfplan_core.planning.budget import BudgetExhaustedError
 from cfplan_core.planning.constraints import (
     REASONS,
@@ -368,15 +368,16 @@ class _Planning:
         name = Preference.FEWEST_SEGMENTS if prefer is Preference.FIRST else prefer
         if stopped:
             return f'{name.value}: the best found so far; {stopped}'
-        bound = ''
+        outcome = 'none better exists'
         if best is not None and best.bound is not None:
-            bound = (
+            if best.bound > (1.0 + 2.0 * PRECISION) * margin:
+                outcome = 'the best found'
+            outcome += (
                 f', whose margin is {margin:.3f} where {best.bound:.3f} is the most there can be'
             )
-        others = '; others were looked for along rays' if self.options.alternatives > 1 else ''
-        return (
-            f'{name.value}: none better exists{bound}{others}; {self.roadmap.regions.coverage()}'
-        )
+        if self.options.alternatives > 1:
+            outcome += '; others were looked for along rays'
+        return f'{name.value}: {outcome}; {self.roadmap.regions.coverage()}'
 
     def _refuse(self, legs: Sequence[Leg]) -> list[int]:
         """Which legs cannot be held, with the reasons noted."""

@@ -262,3 +262,14 @@ def test_a_plan_without_motion_has_no_larger_bound_than_its_margin() -> None:
     assert result.solved
     assert len(result.joints) == 1
     assert result.margin_bound == result.margin
+
+
+def test_none_better_is_said_only_where_the_bound_is_the_margin() -> None:
+    result = certified('second_order/square_between_ledges', prefer='robust')
+    assert result.margin is not None
+    assert result.margin_bound is not None
+    assert result.margin_bound > 1.1 * result.margin
+    assert result.message.startswith('robust: the best found, whose margin is')
+    exact = certified('existence/one_joint_goes_on', prefer='robust')
+    assert exact.margin_bound == exact.margin
+    assert exact.message.startswith('robust: none better exists')
