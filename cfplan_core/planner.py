@@ -36,7 +36,12 @@ from cfplan_core.planning.robustness import Robustness
 from cfplan_core.planning.sampled_search import SampledSearch
 from cfplan_core.planning.search import Leg, Search, Tree
 from cfplan_core.planning.ways import Cost
-from cfplan_core.trajectory.frames import build_frames, overloaded_legs, straying_legs
+from cfplan_core.trajectory.frames import (
+    build_frames,
+    grazing_legs,
+    overloaded_legs,
+    straying_legs,
+)
 from cfplan_core.trajectory.inspection import flaw
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
 
@@ -64,6 +69,7 @@ class Progress:
 # With more joints the search samples; with up to so many it is complete.
 MOST_JOINTS = 2
 TOO_WEAK = 'a joint would exceed its effort limit'
+GRAZING = 'a contact would touch that is not to be there'
 
 
 def plan(
@@ -383,6 +389,7 @@ class _Planning:
         """Which legs cannot be held, with the reasons noted."""
         whole = self._whole(legs)
         refused = dict.fromkeys(overloaded_legs(self.system, self.model, whole), TOO_WEAK)
+        refused |= dict.fromkeys(grazing_legs(self.system, whole), GRAZING)
         refused |= straying_legs(self.system, whole, self.roadmap.constraints.bounds)
         self.roadmap.failures.update(refused.values())
         return list(refused)
