@@ -273,3 +273,8 @@ def test_none_better_is_said_only_where_the_bound_is_the_margin() -> None:
     exact = certified('existence/one_joint_goes_on', prefer='robust')
     assert exact.margin_bound == exact.margin
     assert exact.message.startswith('robust: none better exists')
+
+
+def test_the_shortest_way_over_a_coarse_grid_is_certified() -> None:
+    result = certified('h1181', prefer='shortest', resolution=0.2)
+    assert result.message.startswith('shortest: none better exists')
