@@ -35,6 +35,7 @@ from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.robustness import Robustness
 from cfplan_core.planning.sampled_search import SampledSearch
 from cfplan_core.planning.search import Leg, Search, Tree
+from cfplan_core.planning.sheets import Sheets
 from cfplan_core.planning.ways import Cost
 from cfplan_core.trajectory.frames import (
     build_frames,
@@ -115,6 +116,7 @@ class _Planning:
         self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
         self.robustness = Robustness(self.system, self.model)
         self.search: Search | BestFirst | SampledSearch | None = None
+        self.forgotten = False
 
     def run(self) -> PlanResult:
         examined = examine_problem(self.system, self.model)
@@ -348,9 +350,7 @@ class _Planning:
             if first is None:
                 return None
         try:
-            mesh = BestOnMesh(
-                self.roadmap, start, goal, self.robustness, self.moving.expanded, self._met
-            )
+            mesh = self._mesh(start, goal)
             best = mesh.choose(prefer, first, self._refuse)
             if best is None:
                 return None
@@ -364,6 +364,17 @@ class _Planning:
         message = self._verdict_of_all(stopped, margin, best)
         bound = None if best is None else best.bound
         return replace(self._solved(legs, message), margin=margin, margin_bound=bound)
+
+    def _mesh(self, start: FloatArray, goal: FloatArray | GoalTest) -> BestOnMesh:
+        """All that can be reached, also by the ways that a search for one path has forgotten."""
+        if self.forgotten:
+            constraints, failures = self.roadmap.constraints, self.roadmap.failures
+            self.roadmap = self._roadmap(constraints, self.options.resolution)
+            self.roadmap.failures.update(failures)
+            self.forgotten = False
+        return BestOnMesh(
+            self.roadmap, start, goal, self.robustness, self.moving.expanded, self._met
+        )
 
     def _met(self, pieces: int) -> None:
         self._grown(pieces, 1)
@@ -418,15 +429,16 @@ class _Planning:
         that is there.
         """
         blocked: frozenset[int] = frozenset()
+        complete = True
         while True:
             self.search = search = Search(self.roadmap, start, goal, blocked, self._grown)
             if not search.run():
-                weak = self.roadmap.failures[TOO_WEAK] > 0
-                return self._search_strong(start, goal) if weak else None
+                return None if complete else self._search_strong(start, goal)
             legs = search.path()
             refused = self._refuse(legs)
             if not refused:
                 return legs
+            complete = False
             for index in refused:
                 leg = legs[index]
                 piece = self.roadmap.pieces[leg.piece]
@@ -437,6 +449,7 @@ class _Planning:
                 if isinstance(piece, Region) and passed:
                     for z in passed:
                         self.roadmap.regions.drop(piece, z)
+                        self.forgotten = True
                 else:
                     blocked |= {piece.index}
 
@@ -444,11 +457,11 @@ class _Planning:
         self, start: FloatArray, goal: FloatArray | GoalTest
     ) -> Sequence[Leg] | None:
         """Search all that can be reached without what the joints cannot hold, if that is known."""
-        if self.moving.joint_count > MOST_JOINTS:
+        count = self.moving.joint_count
+        along_rays = count == MOST_JOINTS and not isinstance(self.roadmap.regions, Sheets)
+        if count > MOST_JOINTS or along_rays:
             return None
-        mesh = BestOnMesh(
-            self.roadmap, start, goal, self.robustness, self.moving.expanded, self._met
-        )
+        mesh = self._mesh(start, goal)
         best = mesh.choose(Preference.FEWEST_SEGMENTS, None, self._refuse)
         return None if best is None else best.legs
 
