@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -178,19 +179,17 @@ def _run(
 
 def _shown_on(bar: Bar, runs: Sequence[StudyRun], log: StudyLog) -> Callable[[Record], None]:
     """Make the function that takes the records to the bar."""
-    from cfplan_core.study.success import success_of
+    from cfplan_core.study.record import Verdict
 
-    records = _ended(runs, log)
-    task = bar.add_task('starting workers', total=len(runs), completed=len(records))
+    verdicts = Counter(record.verdict for record in _ended(runs, log))
+    task = bar.add_task('starting workers', total=len(runs), completed=verdicts.total())
 
     def show(record: Record) -> None:
-        records.append(record)
-        successes = success_of(records).successes
-        bar.update(
-            task,
-            completed=len(records),
-            description=f'{len(records)} of {len(runs)} runs, {successes} in the goal',
-        )
+        verdicts[record.verdict] += 1
+        ended = verdicts.total()
+        successes = verdicts[Verdict.IN_GOAL]
+        description = f'{ended} of {len(runs)} runs, {successes} in the goal'
+        bar.update(task, completed=ended, description=description)
 
     return show
 

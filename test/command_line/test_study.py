@@ -34,6 +34,11 @@ def undisturbed(cfplan: Cfplan, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return path
 
 
+def _workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
+    children = psutil.Process(process.pid).children(recursive=True)
+    return [child for child in children if 'spawn_main' in ' '.join(child.cmdline())]
+
+
 def _wait_for_rows(path: Path, rows: int, process: subprocess.Popen[str]) -> None:
     end = time.monotonic() + 120.0
     while not (path.exists() and path.read_bytes().count(b'\n') > rows):
@@ -42,11 +47,13 @@ def _wait_for_rows(path: Path, rows: int, process: subprocess.Popen[str]) -> Non
         time.sleep(0.02)
 
 
-def test_killed_study_goes_on_where_it_stopped(
+def test_killed_worker_and_killed_study_lose_nothing(
     cfplan: Cfplan, start_cfplan: Start, undisturbed: Path, tmp_path: Path
 ) -> None:
     path = tmp_path / 'study.csv'
     process = start_cfplan('study', *STUDY, '-o', path, '--workers', 2, start_new_session=True)
+    _wait_for_rows(path, 1, process)
+    _workers_of(process)[0].kill()
     _wait_for_rows(path, 3, process)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
@@ -55,19 +62,6 @@ def test_killed_study_goes_on_where_it_stopped(
     assert 3 <= kept.count(b'\n') - 1 < RUNS
     path.write_bytes(kept + b'0123456789abcdef,h020,fir')
     assert cfplan('study', *STUDY, '-o', path, '--workers', 1).exit_code == 0
-    assert path.read_bytes() == undisturbed.read_bytes()
-
-
-def test_study_outlives_its_workers(
-    start_cfplan: Start, undisturbed: Path, tmp_path: Path
-) -> None:
-    path = tmp_path / 'study.csv'
-    process = start_cfplan('study', *STUDY, '-o', path, '--workers', 2)
-    _wait_for_rows(path, 2, process)
-    children = psutil.Process(process.pid).children(recursive=True)
-    workers = [child for child in children if 'spawn_main' in ' '.join(child.cmdline())]
-    workers[0].kill()
-    assert process.wait() == 0
     assert path.read_bytes() == undisturbed.read_bytes()
 
 
@@ -84,7 +78,7 @@ def test_interrupted_study_says_how_far_it_came(
     assert complaint.splitlines()[-1] == 'cfplan: interrupted'
     assert 'Traceback' not in complaint
     assert 1 <= path.read_bytes().count(b'\n') - 1 < RUNS
-    assert cfplan('study', *STUDY, '-o', path).exit_code == 0
+    assert cfplan('study', *STUDY, '-o', path, '--workers', 1).exit_code == 0
     assert path.read_bytes() == undisturbed.read_bytes()
 
 
@@ -92,7 +86,8 @@ def test_workers_do_not_outlive_a_killed_study(start_cfplan: Start, tmp_path: Pa
     path = tmp_path / 'study.csv'
     process = start_cfplan('study', *STUDY, '-o', path, '--workers', 1)
     _wait_for_rows(path, 1, process)
-    children = psutil.Process(process.pid).children(recursive=True)
+    children = _workers_of(process)
+    assert children
     process.kill()
     process.wait()
     _, alive = psutil.wait_procs(children, timeout=30.0)
