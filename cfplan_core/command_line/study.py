@@ -124,6 +124,10 @@ def study(
 
     if figure_path is not None and figure_path.suffix.lower() not in ('.png', '.pdf', '.svg'):
         raise CfplanError(f'--figure: got {figure_path}, expected a name in .png, .pdf, .svg')
+    if scheduler is not None and workers is not None:
+        raise CfplanError(
+            f'--workers: got {workers} beside --scheduler, expected none: its workers are there'
+        )
     try:
         varied = parse_variations(variations)
     except CfplanError as error:

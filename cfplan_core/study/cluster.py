@@ -119,7 +119,10 @@ def _record(run: StudyRun, future: Any, attempts: int) -> Record:
         record: Record = future.result()
         return record
     if future.status != 'error':
-        raise CfplanError(f'the scheduler has dropped a run ({future.status}); start again')
+        raise CfplanError(
+            f'the scheduler is gone, or has dropped a run ({future.status}); the runs that ended '
+            'are in the file, the same command goes on'
+        )
     error = future.exception()
     if isinstance(error, import_distributed().KilledWorker):
         reason = f'its worker was lost {attempts} times'
@@ -135,7 +138,8 @@ def _connected(
     """Connect to a scheduler, or start one on this machine, with workers."""
     distributed = import_distributed()
     # What becomes of workers is in the log of the study.
-    logging.getLogger('distributed').setLevel(logging.CRITICAL)
+    for name in ('distributed', 'distributed.client'):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     if scheduler is not None:
         try:
             client = distributed.Client(scheduler, timeout=_CONNECTING)

@@ -15,6 +15,12 @@ import pytest
 from click.testing import Result
 from PIL import Image
 
+from cfplan_core import load_problem
+from cfplan_core.study.design import design_study
+from cfplan_core.study.log import sorted_text
+from cfplan_core.study.parameters import parse_variations
+from cfplan_core.study.running import run_once
+
 pytest.importorskip('mujoco')
 pytest.importorskip('distributed')
 
@@ -27,10 +33,12 @@ Start = Callable[..., 'subprocess.Popen[str]']
 
 
 @pytest.fixture(scope='session')
-def undisturbed(cfplan: Cfplan, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of the study, run in this process."""
     path = tmp_path_factory.mktemp('undisturbed') / 'study.csv'
-    result = cfplan('study', *STUDY, '-o', path, '--workers', 1)
-    assert result.exit_code == 0, result.output
+    variations = parse_variations(['friction=0,0.1', 'mass-error=0:0.2'])
+    runs = design_study([load_problem(H020)], variations, 6, 0)
+    path.write_bytes(sorted_text(run_once(run) for run in runs))
     return path
 
 
@@ -128,10 +136,11 @@ def test_parquet_file_has_the_rows_of_the_log(
         (('--vary', 'friction=11'), 'friction: got 11.0, expected 0 to 10'),
         (('--figure', 'f.jpg'), '--figure: got f.jpg, expected a name in .png, .pdf, .svg'),
         (('--samples', '0'), '0 is not in the range'),
+        (('--scheduler', 'tcp://a:1', '--workers', '2'), '--workers: got 2 beside --scheduler'),
     ],
 )
 def test_impossible_study_is_refused_before_it_starts(
-    cfplan: Cfplan, tmp_path: Path, arguments: tuple[str, str], message: str
+    cfplan: Cfplan, tmp_path: Path, arguments: tuple[str, ...], message: str
 ) -> None:
     path = tmp_path / 'study.csv'
     result = cfplan('study', H020, '-o', path, *arguments)

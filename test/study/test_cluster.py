@@ -16,7 +16,7 @@ from cfplan_core.study.design import StudyRun
 from cfplan_core.study.log import StudyLog
 from cfplan_core.study.record import Record, Verdict, record_of
 
-pytest.importorskip('distributed')
+distributed = pytest.importorskip('distributed')
 
 Design = Callable[..., tuple[StudyRun, ...]]
 
@@ -130,3 +130,16 @@ def test_scheduler_that_does_not_answer_is_named(
     monkeypatch.setattr('cfplan_core.study.cluster._CONNECTING', 0.5)
     with pytest.raises(CfplanError, match=f'no scheduler answers at {address}'):
         run_study(design(), log, scheduler=address)
+
+
+def test_scheduler_that_goes_away_leaves_the_runs_that_ended(
+    design: Design, log: StudyLog
+) -> None:
+    def gone(_: Record) -> None:
+        for future in list(distributed.get_client().futures):
+            distributed.Future(future).cancel()
+
+    runs = design('friction=0,0.1', samples=5)
+    with pytest.raises(CfplanError, match='the same command goes on'):
+        run_study(runs, log, workers=1, done=gone, execute=_quick(0.1))
+    assert 1 <= len(log.records) < len(runs)
