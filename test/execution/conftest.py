@@ -8,8 +8,6 @@ import pytest
 from cfplan_core import PlanResult, Problem, load_problem, plan
 from cfplan_core.execution.execute import Execution, ExecutionOptions, execute_plan
 
-pytest.importorskip('mujoco')
-
 PROBLEMS = Path(__file__).parents[2] / 'config' / 'problems'
 
 

@@ -9,8 +9,6 @@ from cfplan_core import PlanResult, Problem, load_problem, plan
 from cfplan_core.execution.execute import Execution, execute_plan
 from cfplan_core.report.figures.execution import EXECUTED, PLANNED, execution_figure
 
-pytest.importorskip('mujoco')
-
 PROBLEM_FILE = Path(__file__).parents[2] / 'config' / 'problems' / 'h020.yaml'
 
 

@@ -21,8 +21,6 @@ from cfplan_ros.command_line.execute import execute
 from cfplan_ros.recording.reading import read_run
 from cfplan_ros.recording.topics import ESSENTIAL, PREVIEW, REQUEST, RESPONSE
 
-pytest.importorskip('mujoco')
-
 PROBLEM_FILE = Path(__file__).parents[3] / 'config' / 'problems' / 'h020.yaml'
 
 
