@@ -57,10 +57,14 @@ setup(
     ],
     extras_require={
         'mujoco': ['mujoco>=3.3'],
+        'study': ['dask>=2024.8', 'distributed>=2024.8', 'mujoco>=3.3', 'pyarrow>=14.0'],
         'test': [
+            'dask>=2024.8',
+            'distributed>=2024.8',
             'hypothesis>=6.100',
             'mujoco>=3.3',
             'psutil>=5.9',
+            'pyarrow>=14.0',
             'pytest>=7.4',
             'pytest-benchmark>=4.0',
             'pytest-xdist>=3.5',

@@ -19,6 +19,7 @@ def _requirements() -> set[str]:
     text = (ROOT / 'setup.py').read_text(encoding='utf-8')
     asked = text[text.index('install_requires') : text.index('entry_points')]
     return {name.lower() for name in re.findall(r"'([A-Za-z-]+)(?:>=[\d.]+)?'", asked)} - {
+        'study',
         'test',
         'lint',
     }

@@ -18,6 +18,7 @@ from cfplan_core.command_line.console import INVALID_INPUT, complain, complaints
 from cfplan_core.command_line.explore import explore
 from cfplan_core.command_line.map import map_command
 from cfplan_core.command_line.plan import plan
+from cfplan_core.command_line.study import study
 from cfplan_core.command_line.verify import verify
 from cfplan_core.errors import CfplanError, InvalidProblemError
 
@@ -107,5 +108,5 @@ def application() -> None:
     """
 
 
-for command in (check, plan, verify, animate, explore, map_command):
+for command in (check, plan, verify, animate, explore, map_command, study):
     application.add_command(command)
