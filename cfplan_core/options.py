@@ -142,6 +142,10 @@ class PlanOptions:
                     f'{field}: got {getattr(self, field)!r}, expected contact formations, each a '
                     'sequence of at least one name of a contact'
                 )
+        if isinstance(self.held_joints, str):
+            raise CfplanError(
+                f'held_joints: got {self.held_joints!r}, expected a sequence of names of joints'
+            )
         try:
             object.__setattr__(self, 'prefer', Preference(self.prefer))
         except ValueError:

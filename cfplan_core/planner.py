@@ -17,7 +17,7 @@ from cfplan_core.model import Goal, Problem
 from cfplan_core.options import PlanOptions as PlanOptions
 from cfplan_core.options import Preference
 from cfplan_core.planning.best_first import BestFirst
-from cfplan_core.planning.best_on_mesh import Best, BestOnMesh
+from cfplan_core.planning.best_on_mesh import PRECISION, Best, BestOnMesh
 from cfplan_core.planning.budget import BudgetExhaustedError
 from cfplan_core.planning.constraints import (
     REASONS,
@@ -35,8 +35,14 @@ from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.robustness import Robustness
 from cfplan_core.planning.sampled_search import SampledSearch
 from cfplan_core.planning.search import Leg, Search, Tree
+from cfplan_core.planning.sheets import Sheets
 from cfplan_core.planning.ways import Cost
-from cfplan_core.trajectory.frames import build_frames, overloaded_legs, straying_legs
+from cfplan_core.trajectory.frames import (
+    build_frames,
+    grazing_legs,
+    overloaded_legs,
+    straying_legs,
+)
 from cfplan_core.trajectory.inspection import flaw
 from cfplan_core.trajectory.plan_result import PlanResult, Statistics, Status, TreeNode
 
@@ -64,6 +70,7 @@ class Progress:
 # With more joints the search samples; with up to so many it is complete.
 MOST_JOINTS = 2
 TOO_WEAK = 'a joint would exceed its effort limit'
+GRAZING = 'a contact would touch that is not to be there'
 
 
 def plan(
@@ -109,6 +116,7 @@ class _Planning:
         self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
         self.robustness = Robustness(self.system, self.model)
         self.search: Search | BestFirst | SampledSearch | None = None
+        self.forgotten = False
 
     def run(self) -> PlanResult:
         examined = examine_problem(self.system, self.model)
@@ -149,6 +157,9 @@ class _Planning:
                 search = self._search_all if exact else self._search_best
                 # Best is what is best of all that the goal allows.
                 best = search(start, goals[-1])
+                if best is None and several and self.moving.joint_count == MOST_JOINTS:
+                    self.roadmap = on_sheets
+                    best = self._search_all(start, goals[-1])
                 if best is not None:
                     return best
                 legs = None
@@ -341,9 +352,7 @@ class _Planning:
             if first is None:
                 return None
         try:
-            mesh = BestOnMesh(
-                self.roadmap, start, goal, self.robustness, self.moving.expanded, self._met
-            )
+            mesh = self._mesh(start, goal)
             best = mesh.choose(prefer, first, self._refuse)
             if best is None:
                 return None
@@ -358,6 +367,17 @@ class _Planning:
         bound = None if best is None else best.bound
         return replace(self._solved(legs, message), margin=margin, margin_bound=bound)
 
+    def _mesh(self, start: FloatArray, goal: FloatArray | GoalTest) -> BestOnMesh:
+        """All that can be reached, also by the ways that a search for one path has forgotten."""
+        if self.forgotten:
+            constraints, failures = self.roadmap.constraints, self.roadmap.failures
+            self.roadmap = self._roadmap(constraints, self.options.resolution)
+            self.roadmap.failures.update(failures)
+            self.forgotten = False
+        return BestOnMesh(
+            self.roadmap, start, goal, self.robustness, self.moving.expanded, self._met
+        )
+
     def _met(self, pieces: int) -> None:
         self._grown(pieces, 1)
 
@@ -367,17 +387,25 @@ class _Planning:
         name = Preference.FEWEST_SEGMENTS if prefer is Preference.FIRST else prefer
         if stopped:
             return f'{name.value}: the best found so far; {stopped}'
-        bound = ''
+        outcome = 'none better exists'
         if best is not None and best.bound is not None:
-            bound = (
-                f', whose margin is {margin:.3f} where {best.bound:.3f} is the most there can be'
+            if best.bound > (1.0 + 2.0 * PRECISION) * margin:
+                outcome = 'the best found'
+            outcome += (
+                f'; its margin is {margin:.3f}, the largest that can be had {best.bound:.3f}'
             )
-        return f'{name.value}: none better exists{bound}; {self.roadmap.regions.coverage()}'
+        elif prefer is Preference.SHORTEST:
+            # The grid's steps and diagonals are up to 8 % longer than the straight way.
+            outcome = 'none exists that is shorter by more than 8 %'
+        if self.options.alternatives > 1:
+            outcome += '; others were looked for along rays'
+        return f'{name.value}: {outcome}; {self.roadmap.regions.coverage()}'
 
     def _refuse(self, legs: Sequence[Leg]) -> list[int]:
         """Which legs cannot be held, with the reasons noted."""
         whole = self._whole(legs)
         refused = dict.fromkeys(overloaded_legs(self.system, self.model, whole), TOO_WEAK)
+        refused |= dict.fromkeys(grazing_legs(self.system, whole), GRAZING)
         refused |= straying_legs(self.system, whole, self.roadmap.constraints.bounds)
         self.roadmap.failures.update(refused.values())
         return list(refused)
@@ -406,15 +434,16 @@ class _Planning:
         that is there.
         """
         blocked: frozenset[int] = frozenset()
+        complete = True
         while True:
             self.search = search = Search(self.roadmap, start, goal, blocked, self._grown)
             if not search.run():
-                weak = self.roadmap.failures[TOO_WEAK] > 0
-                return self._search_strong(start, goal) if weak else None
+                return None if complete else self._search_strong(start, goal)
             legs = search.path()
             refused = self._refuse(legs)
             if not refused:
                 return legs
+            complete = False
             for index in refused:
                 leg = legs[index]
                 piece = self.roadmap.pieces[leg.piece]
@@ -425,6 +454,7 @@ class _Planning:
                 if isinstance(piece, Region) and passed:
                     for z in passed:
                         self.roadmap.regions.drop(piece, z)
+                        self.forgotten = True
                 else:
                     blocked |= {piece.index}
 
@@ -432,11 +462,11 @@ class _Planning:
         self, start: FloatArray, goal: FloatArray | GoalTest
     ) -> Sequence[Leg] | None:
         """Search all that can be reached without what the joints cannot hold, if that is known."""
-        if self.moving.joint_count > MOST_JOINTS:
+        count = self.moving.joint_count
+        along_rays = count == MOST_JOINTS and not isinstance(self.roadmap.regions, Sheets)
+        if count > MOST_JOINTS or along_rays:
             return None
-        mesh = BestOnMesh(
-            self.roadmap, start, goal, self.robustness, self.moving.expanded, self._met
-        )
+        mesh = self._mesh(start, goal)
         best = mesh.choose(Preference.FEWEST_SEGMENTS, None, self._refuse)
         return None if best is None else best.legs
 
@@ -460,9 +490,11 @@ class _Planning:
     def _explored(self) -> str:
         """What was searched, and why it did not lead on."""
         failures = '; '.join(f'{n} × {why}' for why, n in self.roadmap.failures.most_common(5))
+        formations, attempts = self.roadmap.formations(), self.roadmap.attempts
         return (
-            f'explored {self.roadmap.formations()} contact formations by '
-            f'{self.roadmap.attempts} transitions; most frequent failures: {failures or "none"}'
+            f'explored {formations} contact formation{"s" if formations != 1 else ""} by '
+            f'{attempts} transition{"s" if attempts != 1 else ""}; '
+            f'most frequent failures: {failures or "none"}'
         )
 
     def _sampled(self) -> str:

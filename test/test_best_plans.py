@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from cfplan_core import (
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.mechanics.frictionless import FrictionlessModel
+from cfplan_core.model import Goal
 from cfplan_core.planning.best_first import BestFirst
 from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.pieces import Piece, Region
@@ -186,7 +188,9 @@ def test_alternatives_differ_in_their_contact_formations_and_come_best_first() -
 
 def test_the_answer_says_that_no_better_plan_exists() -> None:
     result = certified('h1181', prefer='shortest')
-    assert result.message.startswith('shortest: none better exists; everything that can be')
+    assert result.message.startswith(
+        'shortest: none exists that is shorter by more than 8 %; everything that can be'
+    )
     assert 'grid of joint angles of 0.05 rad' in result.message
 
 
@@ -244,3 +248,35 @@ def test_the_shortest_plan_of_a_random_problem_is_no_longer_than_the_first(seed:
     shortest = plan(problem, PlanOptions(prefer=Preference.SHORTEST, second_order=False))
     assert verify_plan(problem, shortest).failures == ()
     assert shortest.length <= first.length + 1e-9
+
+
+def test_no_alternatives_are_a_proof_only_where_regions_were_filled() -> None:
+    problem = load_problem(PROBLEMS / 'existence' / 'barrier_too_low.yaml')
+    result = plan(problem, PlanOptions(alternatives=2))
+    assert result.status is Status.INFEASIBLE
+    assert 'over a grid of joint angles' in result.message
+
+
+def test_a_plan_without_motion_has_no_larger_bound_than_its_margin() -> None:
+    problem = load_problem(PROBLEMS / 'h045.yaml')
+    touching = replace(problem, goal=Goal(contacts=('object.v0|palm.0.e2',)))
+    result = plan(touching, PlanOptions(prefer=Preference.ROBUST, held_joints=('left_joint',)))
+    assert result.solved
+    assert len(result.joints) == 1
+    assert result.margin_bound == result.margin
+
+
+def test_none_better_is_said_only_where_the_bound_is_the_margin() -> None:
+    result = certified('second_order/square_between_ledges', prefer='robust')
+    assert result.margin is not None
+    assert result.margin_bound is not None
+    assert result.margin_bound > 1.1 * result.margin
+    assert result.message.startswith('robust: the best found, whose margin is')
+    exact = certified('existence/one_joint_goes_on', prefer='robust')
+    assert exact.margin_bound == exact.margin
+    assert exact.message.startswith('robust: none better exists')
+
+
+def test_the_shortest_way_over_a_coarse_grid_is_certified() -> None:
+    result = certified('h1181', prefer='shortest', resolution=0.2)
+    assert result.message.startswith('shortest: none exists that is shorter by more than 8 %')

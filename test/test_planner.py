@@ -229,6 +229,11 @@ def test_budget_that_allows_nothing_is_refused(options: dict[str, Any]) -> None:
         PlanOptions(**options)
 
 
+def test_one_name_is_no_sequence_of_held_joints() -> None:
+    with pytest.raises(CfplanError, match="held_joints: got 'left_joint', expected a sequence"):
+        PlanOptions(held_joints='left_joint')  # type: ignore[arg-type]
+
+
 def test_search_that_was_cancelled_before_it_began_ends_at_once() -> None:
     cancel = threading.Event()
     cancel.set()

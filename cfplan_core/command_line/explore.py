@@ -61,20 +61,19 @@ def explore(
     console = answers()
     console.print(_table(explored))
     nodes, transitions = len(explored.graph), explored.graph.number_of_edges()
-    console.print(f'{nodes} parts of contact formations, {transitions} transitions.')
-    console.print(f'{explored.coverage[0].upper()}{explored.coverage[1:]}.', soft_wrap=True)
+    parts = 'part of a contact formation' if nodes == 1 else 'parts of contact formations'
+    console.print(f'{nodes} {parts}, {transitions} transition{"s" if transitions != 1 else ""}.')
+    console.print(f'{explored.coverage[0].upper()}{explored.coverage[1:]}.')
     return 0
 
 
 def _table(explored: Exploration) -> Table:
     table = new_table(f'What can be reached in {explored.problem.name}')
-    table.add_column('Part', justify='right')
+    table.add_column('Part', justify='right', overflow='fold')
     table.add_column('Contacts', no_wrap=True)
-    table.add_column('Stability')
-    table.add_column('Dimension', justify='right')
-    for name in explored.problem.hand.joint_names:
-        table.add_column(f'{name} (rad)')
-    table.add_column('Next to')
+    table.add_column('Stability', overflow='fold')
+    table.add_column('Joints (rad)', min_width=len('-0.000 to -0.000'), overflow='fold')
+    table.add_column('Next to', overflow='fold')
     for index in sorted(explored.graph):
         node = explored.graph.nodes[index]
         role = {explored.start: ' start', explored.goal: ' goal'}.get(index, '')
@@ -83,10 +82,9 @@ def _table(explored: Exploration) -> Table:
         table.add_row(
             f'{index}{role}',
             '\n'.join(node['contacts']),
-            node['stability'].replace('_', ' '),
-            str(node['dimension']),
-            *(
-                f'{node["lower"][name]:.3f} to {node["upper"][name]:.3f}'
+            f'{node["stability"].replace("_", " ")}\ndimension {node["dimension"]}',
+            '\n'.join(
+                f'{name}\n{node["lower"][name]:.3f} to {node["upper"][name]:.3f}'
                 for name in explored.problem.hand.joint_names
             ),
             ', '.join(str(other) for other in sorted(explored.graph[index])),

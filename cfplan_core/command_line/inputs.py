@@ -43,7 +43,9 @@ def examine(path: Path) -> Examined:
     reading = read_problem(path)
     findings = tuple(reading.findings)
     if reading.problem is not None:
-        findings += tuple(check_problem(reading.problem, str(path)))
+        fields = {finding.field for finding in findings}
+        further = check_problem(reading.problem, str(path))
+        findings += tuple(finding for finding in further if finding.field not in fields)
     return Examined(reading.problem, findings)
 
 

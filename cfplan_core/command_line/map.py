@@ -47,6 +47,6 @@ def map_command(file: Path, output: Path, resolution: float, second_order: bool)
     result = plan(problem, options)
     save_figure(joint_map(explored, result), output)
     console = answers()
-    console.print(f'{explored.coverage[0].upper()}{explored.coverage[1:]}.', soft_wrap=True)
+    console.print(f'{explored.coverage[0].upper()}{explored.coverage[1:]}.')
     console.print(f'Figure: {output}', soft_wrap=True)
     return 0

@@ -7,6 +7,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -122,6 +123,9 @@ def plan(
     if interrupted:
         complain('interrupted; nothing is written')
         return INTERRUPTED
+    if result.status is Status.INVALID:
+        named = result.message.replace('<problem>: ', f'{file}: ')
+        result = replace(result, message=named)
 
     # Files first: they must be there even if the reader of the tables leaves early.
     if json_path is not None:

@@ -84,7 +84,8 @@ def wanted_plan(command: Command) -> Command:
             type=click.IntRange(min=1),
             default=1,
             metavar='K',
-            help='Find K plans with different sequences of contact formations, best first.',
+            help='Find K plans with different sequences of contact formations, best first; those '
+            'of fewest segments unless --prefer says otherwise.',
         ),
         click.option(
             '--max-needed-force',

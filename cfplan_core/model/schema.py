@@ -74,6 +74,11 @@ def _unknown(error: Any, path: Path) -> Iterator[Fault]:
             )
 
 
+def _none_of(error: Any, path: Path) -> Iterator[Fault]:
+    keys = [key for choice in error.validator_value for key in choice['required']]
+    yield Fault(path, shown(error.instance), f'at least one of {", ".join(keys)}')
+
+
 def _repeated(error: Any, path: Path) -> Iterator[Fault]:
     seen = set()
     for k, item in enumerate(map(repr, error.instance)):
@@ -85,6 +90,7 @@ def _repeated(error: Any, path: Path) -> Iterator[Fault]:
 _TRANSLATIONS: Mapping[str, Any] = {
     'required': _missing,
     'additionalProperties': _unknown,
+    'anyOf': _none_of,
     'uniqueItems': _repeated,
 }
 

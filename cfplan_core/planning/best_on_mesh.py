@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.options import Preference
 from cfplan_core.planning.goal_test import GoalTest
@@ -146,6 +148,9 @@ class BestOnMesh:
         straight = straightened(self._roadmap, legs, lambda leg: self._keeps(leg, floor))
         legs = max((straight, legs), key=lambda some: min(self.margin(some), floor))
         margin = self.margin(legs)
+        if not np.isfinite(bound):
+            # Nothing moves: every plan has the margin of the start at most.
+            bound = margin
         if known is not None and low >= margin:
             return Best(list(known), bound=max(low, bound))
         return Best(legs, way, max(margin, bound))

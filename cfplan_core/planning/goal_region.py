@@ -156,12 +156,12 @@ class GoalRegion:
         if self._position is not None:
             apart = float(np.hypot(off[0], off[1])) * self._size
             limit = float(self._tolerance[0]) * self._size
-            parts.append(f'the object {apart:.3g} m off, {limit:g} allowed')
+            parts.append(_off('the object', apart, limit, 'm'))
             rest = rest[2:]
         for k in rest:
             column = int(self.columns[k])
             name = 'the object' if column == 2 else self._names[column - 3]
-            parts.append(f'{name} {off[k]:.3g} rad off, {self._tolerance[k]:g} allowed')
+            parts.append(_off(name, float(off[k]), float(self._tolerance[k]), 'rad'))
         return ', '.join(parts)
 
     def step(self, z: FloatArray, basis: FloatArray) -> FloatArray:
@@ -172,3 +172,9 @@ class GoalRegion:
         slope = basis @ self.gradients(z).T
         along = np.linalg.lstsq(slope.T, self.offsets(z[None])[0], rcond=1e-6)[0]
         return np.asarray(along @ basis)
+
+
+def _off(name: str, offset: float, limit: float, unit: str) -> str:
+    """Say how far off something is; beside what is allowed, rounding is nothing."""
+    shown = 0.0 if offset < 1e-6 * limit else offset
+    return f'{name} {shown:.3g} {unit} off, {limit:g} allowed'

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cfplan_core.contact.detection import touching
 from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.system import BoolArray, ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
@@ -19,6 +20,7 @@ from cfplan_core.planning.manifold import formation_equations, project, settle_i
 from cfplan_core.planning.search import Leg
 from cfplan_core.planning.stability_classes import split_by_class
 from cfplan_core.planning.tracing import STABILITY_MARGIN, Tracer
+from cfplan_core.planning.transitions import TOUCH
 from cfplan_core.trajectory.inertia import moving_masses
 from cfplan_core.trajectory.plan_result import Segment
 from cfplan_core.trajectory.segment_ends import contact_events
@@ -73,6 +75,22 @@ def straying_legs(
             if not (bound.margins(z, gradients) >= 0.0).all():
                 straying.setdefault(index, bound.reason)
     return straying
+
+
+def grazing_legs(system: ContactSystem, legs: Sequence[Leg]) -> list[int]:
+    """Tell in which legs a contact that they do not name touches all the way, by index.
+
+    These have no frame between their ends, and it touches at both: they run along the border of
+    their contact formation, by less than frames can show.
+    """
+    grazing = []
+    for index, leg in enumerate(legs):
+        ends = _evenly(system, leg)
+        if len(ends) == 2:
+            both = set.intersection(*(set(touching(system, z, TOUCH).tolist()) for z in ends))
+            if both - set(leg.formation.pairs):
+                grazing.append(index)
+    return grazing
 
 
 def build_frames(

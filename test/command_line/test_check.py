@@ -93,3 +93,15 @@ def test_tables_fit_the_terminal(
     output = cfplan('check', problem_file).output
     assert max(len(line) for line in output.splitlines()) <= width
     assert '…' not in output
+
+
+def test_goal_beyond_a_joint_limit_is_one_finding(
+    cfplan: Cfplan, problem_file: Path, tmp_path: Path
+) -> None:
+    before, _, _ = problem_file.read_text(encoding='utf-8').partition('\ngoal:')
+    beyond = tmp_path / 'beyond.yaml'
+    beyond.write_text(f'{before}\ngoal:\n  joints: {{left_joint: 9.0}}\n', encoding='utf-8')
+    result = cfplan('check', beyond)
+    assert result.exit_code == 2
+    assert result.output.count('goal.joints.left_joint') == 1
+    assert '1 finding' in result.output

@@ -48,3 +48,15 @@ def test_map_of_an_unknown_kind_is_refused(tmp_path: Path) -> None:
     ran = CliRunner().invoke(application, ['map', str(problem), '-o', str(tmp_path / 'map.bmp')])
     assert ran.exit_code == 2
     assert '.png' in ran.stderr
+
+
+@pytest.mark.parametrize('width', ['80', '120'])
+def test_table_of_two_joints_is_whole_in_a_terminal(
+    width: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('COLUMNS', width)
+    ran = CliRunner().invoke(application, ['explore', str(FOLDER / 'barrier_too_low.yaml')])
+    assert '…' not in ran.output
+    assert all(len(line) <= int(width) for line in ran.output.splitlines())
+    for word in ('Stability', 'force', 'closure', 'dimension 2', 'left_joint', 'right_joint'):
+        assert word in ran.output

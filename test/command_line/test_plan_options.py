@@ -67,3 +67,14 @@ def test_what_makes_no_sense_is_refused_by_name(
     result = cfplan('plan', PROBLEM, *arguments)
     assert result.exit_code == 2
     assert message in ' '.join((result.output + result.stderr).split())
+
+
+def test_a_start_that_breaks_a_constraint_is_refused_by_the_name_of_the_file(
+    cfplan: Cfplan, tmp_path: Path
+) -> None:
+    out = tmp_path / 'plan.json'
+    result = cfplan('plan', PROBLEM, '--max-contacts', '3', '--json', out)
+    assert result.exit_code == 2
+    for shown in (result.stderr, read_plan(out).message):
+        assert f'{PROBLEM}: start: got 4 contacts' in shown
+        assert '<problem>' not in shown

@@ -445,7 +445,9 @@ def test_joint_goal_beyond_its_limits_may_be_within_its_tolerance():
 def test_goal_of_nothing_but_a_tolerance_is_found():
     finding = only_finding((('goal',), {'tolerance': {'angle': 0.1}}))
     assert finding.field == 'goal'
-    assert 'at least one of object_pose, position, orientation, joints' in finding.expected
+    assert finding.expected == (
+        'at least one of object_pose, position, orientation, joints, contacts'
+    )
 
 
 @pytest.mark.parametrize(

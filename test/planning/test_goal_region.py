@@ -93,3 +93,12 @@ def test_position_and_orientation_are_a_pose() -> None:
     assert whole is not None
     np.testing.assert_array_equal(apart.object_pose, whole.object_pose)
     assert Goal(position=(0.01, 0.02), joints=joints).grasp(hand) is None
+
+
+def test_rounding_is_no_distance_from_the_goal() -> None:
+    region = GoalRegion(SYSTEM, Goal(orientation=float(SYSTEM.object_poses(Z[None])[0, 2])))
+    off = Z.copy()
+    off[2] += 1e-16
+    assert region.describe(off) == 'the object 0 rad off, 0.001 allowed'
+    off[2] += 0.02
+    assert region.describe(off) == 'the object 0.02 rad off, 0.001 allowed'

@@ -24,6 +24,7 @@ from scipy.optimize import linprog
 
 from cfplan_core.contact.detection import touching
 from cfplan_core.contact.elements import parse_contact
+from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.gaps import gaps
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
@@ -34,7 +35,7 @@ from cfplan_core.options import ACCELERATION
 from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.search import Leg, Search
-from cfplan_core.trajectory.frames import Frames, build_frames, overloaded_legs
+from cfplan_core.trajectory.frames import Frames, build_frames, grazing_legs, overloaded_legs
 from cfplan_core.trajectory.plan_result import Segment
 from cfplan_core.trajectory.timing import fastest, joint_velocities, rest_frames, strongest
 
@@ -371,3 +372,19 @@ def test_path_that_stays_is_one_segment_of_the_start() -> None:
     assert segment.last_frame == len(it.frames.times) - 1
     np.testing.assert_allclose(it.z, np.tile(it.z[0], (len(it.z), 1)), atol=1e-15)
     assert (np.diff(it.frames.times) > 0.0).all()
+
+
+def test_a_short_leg_along_the_border_of_its_formation_is_found() -> None:
+    problem = load_problem(PROBLEMS / 'h045.yaml')
+    system = ContactSystem(problem)
+    model = FrictionlessModel(system.load)
+    curve = Roadmap(system, model).root(examine_problem(system, model).start.z)
+    pairs = curve.formation.pairs
+    points = curve.points[:2]
+    along = Leg(0, curve.formation, curve.stability, points)
+    border = replace(along, formation=Formation(pairs[:-1]))
+    # The last contact is open somewhere on the way if it is at one of the ends.
+    opening = points.copy()
+    opening[1, 1] += 0.01
+    away = replace(border, points=opening)
+    assert grazing_legs(system, [along, border, away]) == [1]
