@@ -164,6 +164,7 @@ def _local_cluster(workers: int, attempts: int) -> Any:
         'distributed.scheduler.worker-saturation': 1.0,
         'distributed.scheduler.http.routes': [],
         'distributed.worker.http.routes': [],
+        'distributed.worker.profile.enabled': False,
     }
     with dask.config.set(settings), warnings.catch_warnings():
         # The port that the scheduler would like to have may be taken; nobody needs it.
