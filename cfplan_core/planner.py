@@ -160,6 +160,8 @@ class _Planning:
                 if best is None and several and self.moving.joint_count == MOST_JOINTS:
                     self.roadmap = on_sheets
                     best = self._search_all(start, goals[-1])
+                if best is None and len(goals) > 1:
+                    best = search(start, goals[0])
                 if best is not None:
                     return best
                 legs = None
