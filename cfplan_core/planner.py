@@ -34,7 +34,7 @@ from cfplan_core.planning.pieces import Region
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.robustness import Robustness
 from cfplan_core.planning.sampled_search import SampledSearch
-from cfplan_core.planning.search import Leg, Search, Tree
+from cfplan_core.planning.search import Leg, PathTrees, Search, Tree
 from cfplan_core.planning.sheets import Sheets
 from cfplan_core.planning.ways import Cost
 from cfplan_core.trajectory.frames import (
@@ -115,7 +115,7 @@ class _Planning:
         self.model = FrictionlessModel(self.system.load, self.options.second_order)
         self.roadmap = Roadmap(self.system, self.model, self._checkpoint)
         self.robustness = Robustness(self.system, self.model)
-        self.search: Search | BestFirst | SampledSearch | None = None
+        self.search: Search | BestFirst | PathTrees | SampledSearch | None = None
         self.forgotten = False
 
     def run(self) -> PlanResult:
@@ -364,6 +364,8 @@ class _Planning:
             stopped = str(stop)
         legs = first if best is None else best.legs
         assert legs is not None
+        if best is not None and best.way is not None:
+            self.search = PathTrees(self.roadmap, legs)
         margin = self._margin(legs)
         message = self._verdict_of_all(stopped, margin, best)
         bound = None if best is None else best.bound
@@ -470,7 +472,10 @@ class _Planning:
             return None
         mesh = self._mesh(start, goal)
         best = mesh.choose(Preference.FEWEST_SEGMENTS, None, self._refuse)
-        return None if best is None else best.legs
+        if best is None:
+            return None
+        self.search = PathTrees(self.roadmap, best.legs)
+        return best.legs
 
     def _checkpoint(self) -> None:
         """Stop the search when it has to."""

@@ -239,7 +239,7 @@ def test_no_alternatives_at_all_are_refused() -> None:
         PlanOptions(alternatives=0)
 
 
-@pytest.mark.parametrize('seed', [2, 8])
+@pytest.mark.parametrize('seed', [1, 8])
 def test_the_shortest_plan_of_a_random_problem_is_no_longer_than_the_first(seed: int) -> None:
     start = random_problem(seed)
     problem = distant_goal(start, explore(start, 60), seed)
@@ -271,7 +271,7 @@ def test_none_better_is_said_only_where_the_bound_is_the_margin() -> None:
     assert result.margin is not None
     assert result.margin_bound is not None
     assert result.margin_bound > 1.1 * result.margin
-    assert result.message.startswith('robust: the best found, whose margin is')
+    assert result.message.startswith('robust: the best found; its margin is')
     exact = certified('existence/one_joint_goes_on', prefer='robust')
     assert exact.margin_bound == exact.margin
     assert exact.message.startswith('robust: none better exists')

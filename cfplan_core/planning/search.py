@@ -8,7 +8,7 @@ no path in the pieces explored.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -83,6 +83,25 @@ class Tree:
             nodes.append(self.nodes[at])
             at = self.nodes[at].parent
         return nodes[::-1]
+
+
+class PathTrees:
+    """A path that was found otherwise, as CF-trees.
+
+    Attributes:
+        trees: The initial tree is the pieces of the path one after the other, the goal's the last.
+        meeting: Index of the last piece.
+    """
+
+    def __init__(self, roadmap: Roadmap, legs: Sequence[Leg]) -> None:
+        """Make the trees of a path of one leg or more."""
+        initial, goal = Tree(legs[0].points[0]), Tree(legs[-1].points[-1])
+        for index, leg in enumerate(legs):
+            parent, entry = (index - 1, leg.points[0]) if index else (None, None)
+            initial.add(Node(roadmap.pieces[leg.piece], parent, entry, index))
+        self.meeting = legs[-1].piece
+        goal.add(Node(roadmap.pieces[self.meeting], None, None, 0))
+        self.trees = (initial, goal)
 
 
 class Search:
