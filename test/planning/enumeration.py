@@ -16,7 +16,7 @@ import numpy as np
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.model import Problem
 
-_TURNS = 120
+_TURNS = 240
 _HALVINGS = 48
 _TOUCH = 1e-8
 _FORCE = 1e-6

@@ -12,8 +12,11 @@ from cfplan_core.model import Problem
 from cfplan_core.planning import expedition
 from cfplan_core.verification import verify_plan
 
+# That of 20 joints takes minutes to certify: benchmark/test_many_joints.py does.
 PROBLEMS = sorted(
-    (Path(__file__).parents[2] / 'config' / 'problems' / 'many_joints').glob('*.yaml')
+    path
+    for path in (Path(__file__).parents[2] / 'config' / 'problems' / 'many_joints').glob('*.yaml')
+    if path.stem != 'four_fingers_five_joints'
 )
 every_problem = pytest.mark.parametrize('path', PROBLEMS, ids=lambda path: path.stem)
 
