@@ -10,14 +10,11 @@ from cfplan_core.contact.system import ContactSystem
 from cfplan_core.errors import CfplanError, InvalidProblemError
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Problem
-from cfplan_core.options import RESOLUTION
+from cfplan_core.options import MOST_JOINTS, RESOLUTION
 from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.pieces import Piece
 from cfplan_core.planning.roadmap import Roadmap
 from cfplan_core.planning.sheet_graph import configurations as configurations
-
-# Hands for which exploration ends, and is complete.
-MOST_JOINTS = 2
 
 
 @dataclass(frozen=True, eq=False)

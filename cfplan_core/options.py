@@ -14,6 +14,8 @@ from cfplan_core.geometry.polygon import is_flat, signed_area
 RESOLUTION = 0.05
 """Spacing of the grid of joint angles that regions are filled over unless asked otherwise, rad."""
 
+MOST_JOINTS = 2
+"""Hands of which so many joints move are explored completely, with more the search samples."""
 
 ACCELERATION = 10.0
 """Acceleration limit of joints for which the problem states none, rad/s²."""

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from cfplan_core import verdicts
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.held import HeldSystem
 from cfplan_core.contact.system import ContactSystem
@@ -14,13 +15,12 @@ from cfplan_core.errors import CfplanError, Finding
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.model import Goal, Problem
+from cfplan_core.options import MOST_JOINTS, Preference
 from cfplan_core.options import PlanOptions as PlanOptions
-from cfplan_core.options import Preference
 from cfplan_core.planning.best_first import BestFirst
-from cfplan_core.planning.best_on_mesh import PRECISION, Best, BestOnMesh
+from cfplan_core.planning.best_on_mesh import BestOnMesh
 from cfplan_core.planning.budget import BudgetExhaustedError
 from cfplan_core.planning.constraints import (
-    REASONS,
     Constraints,
     compile_constraints,
     contradictions,
@@ -67,9 +67,6 @@ class Progress:
     message: str
 
 
-# With more joints the search samples; with up to so many it is complete.
-MOST_JOINTS = 2
-TOO_WEAK = 'a joint would exceed its effort limit'
 GRAZING = 'a contact would touch that is not to be there'
 
 
@@ -171,12 +168,14 @@ class _Planning:
                     self.roadmap = on_sheets
                     legs = self._search_goals(start, goals)
         except BudgetExhaustedError as stop:
-            return self._answer(
-                Status.BUDGET_EXHAUSTED, f'{stop}; {self._explored()}{self._sampled()}'
-            )
+            message = f'{stop}; {verdicts.explored(self.roadmap)}'
+            if isinstance(self.search, SampledSearch):
+                message += verdicts.sampled(self.options, self.search)
+            return self._answer(Status.BUDGET_EXHAUSTED, message)
         if legs is None:
             nearest = goals[-1].how_near() if isinstance(goals[-1], GoalTest) else ''
-            message = f'no path{nearest}; {self._explored()}{self._doubt()}'
+            message = f'no path{nearest}; {verdicts.explored(self.roadmap)}'
+            message += verdicts.doubt(self.roadmap)
             if self.moving.joint_count > MOST_JOINTS:
                 message += '. Rays do not show that there is no plan'
                 return self._answer(Status.BUDGET_EXHAUSTED, message)
@@ -276,13 +275,9 @@ class _Planning:
         except BudgetExhaustedError as stop:
             if not found:
                 raise
-            stopped = f'; {stop}'
+            stopped = str(stop)
         ranked = sorted(found.values(), key=lambda rated: rated[0])
-        name = Preference.FEWEST_SEGMENTS if options.prefer is Preference.FIRST else options.prefer
-        message = (
-            f'{name.value}: the best of {len(ranked)} different plans, by {search.attempts} '
-            f'searches that sample: a better one may exist{stopped}'
-        )
+        message = verdicts.best_sampled(options, search, stopped, len(ranked))
         results = [
             replace(self._solved(legs, message), margin=self._margin(legs))
             for _, legs in ranked[: options.alternatives]
@@ -332,7 +327,8 @@ class _Planning:
         except BudgetExhaustedError as stop:
             stopped = str(stop)
             best.settle_for_best(first, self._refuse)
-        message = self._verdict(stopped, max(len(best.chosen), first is not None))
+        found = max(len(best.chosen), first is not None)
+        message = verdicts.best_explored(options, self.roadmap, stopped, found)
         results = []
         for label in best.chosen:
             best.conclude(label)
@@ -367,7 +363,7 @@ class _Planning:
         if best is not None and best.way is not None:
             self.search = PathTrees(self.roadmap, legs)
         margin = self._margin(legs)
-        message = self._verdict_of_all(stopped, margin, best)
+        message = verdicts.best_of_all(self.options, self.roadmap, stopped, margin, best)
         bound = None if best is None else best.bound
         return replace(self._solved(legs, message), margin=margin, margin_bound=bound)
 
@@ -385,50 +381,14 @@ class _Planning:
     def _met(self, pieces: int) -> None:
         self._grown(pieces, 1)
 
-    def _verdict_of_all(self, stopped: str, margin: float, best: Best | None) -> str:
-        """Say whether a plan is the best of all that can be reached, and at what resolution."""
-        prefer = self.options.prefer
-        name = Preference.FEWEST_SEGMENTS if prefer is Preference.FIRST else prefer
-        if stopped:
-            return f'{name.value}: the best found so far; {stopped}'
-        outcome = 'none better exists'
-        if best is not None and best.bound is not None:
-            if best.bound > (1.0 + 2.0 * PRECISION) * margin:
-                outcome = 'the best found'
-            outcome += (
-                f'; its margin is {margin:.3f}, the largest that can be had {best.bound:.3f}'
-            )
-        elif prefer is Preference.SHORTEST:
-            # The grid's steps and diagonals are up to 8 % longer than the straight way.
-            outcome = 'none exists that is shorter by more than 8 %'
-        if self.options.alternatives > 1:
-            outcome += '; others were looked for along rays'
-        return f'{name.value}: {outcome}; {self.roadmap.regions.coverage()}'
-
     def _refuse(self, legs: Sequence[Leg]) -> list[int]:
         """Which legs cannot be held, with the reasons noted."""
         whole = self._whole(legs)
-        refused = dict.fromkeys(overloaded_legs(self.system, self.model, whole), TOO_WEAK)
+        refused = dict.fromkeys(overloaded_legs(self.system, self.model, whole), verdicts.TOO_WEAK)
         refused |= dict.fromkeys(grazing_legs(self.system, whole), GRAZING)
         refused |= straying_legs(self.system, whole, self.roadmap.constraints.bounds)
         self.roadmap.failures.update(refused.values())
         return list(refused)
-
-    def _verdict(self, stopped: str, found: int) -> str:
-        """Say whether plans are the best, and among what."""
-        prefer = self.options.prefer
-        name = Preference.FEWEST_SEGMENTS if prefer is Preference.FIRST else prefer
-        if stopped:
-            return f'{name.value}: the best found so far; {stopped}'
-        wanted = self.options.alternatives
-        few = f'no more than {found} different plans, ' if found < wanted else ''
-        pieces = self.roadmap.pieces
-        regions = sum(piece.dimension > 1 for piece in pieces)
-        rays = f', {regions} of them regions of dimension 2 and more seen along rays'
-        return (
-            f'{name.value}: {few}none better exists in the {len(pieces)} pieces of contact '
-            f'formations explored{rays if regions else ""}'
-        )
 
     def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> Sequence[Leg] | None:
         """Search until a path is found that the joints' efforts can hold.
@@ -493,39 +453,6 @@ class _Planning:
         limit = self.options.max_nodes
         if limit is not None and initial + goal > limit:
             raise BudgetExhaustedError(f'budget of {limit} nodes exhausted')
-
-    def _explored(self) -> str:
-        """What was searched, and why it did not lead on."""
-        failures = '; '.join(f'{n} × {why}' for why, n in self.roadmap.failures.most_common(5))
-        formations, attempts = self.roadmap.formations(), self.roadmap.attempts
-        return (
-            f'explored {formations} contact formation{"s" if formations != 1 else ""} by '
-            f'{attempts} transition{"s" if attempts != 1 else ""}; '
-            f'most frequent failures: {failures or "none"}'
-        )
-
-    def _sampled(self) -> str:
-        """What an answer without a plan means if the search was by sampling."""
-        if not isinstance(self.search, SampledSearch):
-            return ''
-        return (
-            f'. With more than {MOST_JOINTS} joints the search samples: it pushed along '
-            f'{self.search.drives} drives, seed {self.options.seed}, which does not show that '
-            'there is no plan'
-        )
-
-    def _doubt(self) -> str:
-        """How far an answer of no path is short of a proof."""
-        blocked = self.roadmap.failures[TOO_WEAK]
-        doubt = ''
-        if blocked:
-            doubt += f'. Left out, as a joint would exceed its effort limit: {blocked} pieces'
-        for why in REASONS:
-            count = sum(n for reason, n in self.roadmap.failures.items() if reason.endswith(why))
-            if count:
-                doubt += f'. Not followed, as {why}: {count} ways'
-        coverage = self.roadmap.regions.coverage()
-        return f'{doubt}. {coverage[0].upper()}{coverage[1:]}'
 
     def _answer(self, status: Status, message: str) -> PlanResult:
         trees = self.search.trees if self.search is not None else ()
