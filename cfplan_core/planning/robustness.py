@@ -1,12 +1,15 @@
 """How far a motion is from what would spoil it, as one number.
 
-The margin is the smallest of five ratios; 1 is comfortable, 0 is the border of what works:
+The margin is the smallest of six ratios; 1 is comfortable, 0 is the border of what works:
 
 - force: 1 / F, where F is the needed force in weights of the object;
 - hold: the stability margin, the distance of W's columns and f from no longer spanning R³, / 0.2;
   for two contacts that of second order, the smallest of the energy's curvature, the two forces
   and the sine between the wrenches. Where other contacts stop pressing and the object settles onto
   two of them, these two count if that is more, less the load that they leave to the others;
+- stiffness: 0.005 / the largest shift of the object, in object sizes and rad, by friction of 0.1
+  where drives of 330 weights times sizes per rad hold the joints; 0 where such drives are too soft
+  to keep the object stable (`friction_shifts`);
 - clearance: the smallest distance of a near miss, in object sizes, / 0.1. A near miss is a vertex
   and an edge that come nearer than 0.1 and part again without having touched in between;
 - torque: k contacts of rank 3 leave k − 3 joints to be controlled by their torque (Trinkle &
@@ -28,10 +31,13 @@ import numpy as np
 
 from cfplan_core.contact.curvature import wrench_rates
 from cfplan_core.contact.formation import Formation
-from cfplan_core.contact.gaps import gap_gradients
+from cfplan_core.contact.gaps import gap_gradients, offset_gradients
+from cfplan_core.contact.hessians import gap_hessians
 from cfplan_core.contact.system import ContactSystem, Placement
 from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.contact_forces import least_forces
 from cfplan_core.mechanics.contact_model import ContactModel
+from cfplan_core.mechanics.friction_shift import friction_shifts
 from cfplan_core.mechanics.second_order import pair_forces, unbalanced_margin
 from cfplan_core.planning.equations import is_second_order
 from cfplan_core.planning.near_misses import near_misses
@@ -41,6 +47,10 @@ _COMFORTABLE_HOLD = 0.2
 COMFORTABLE_CLEARANCE = 0.1
 _COMFORTABLE_TORQUE = 0.2
 _COMFORTABLE_LIMIT = 0.1
+_COMFORTABLE_SHIFT = 0.005
+# What the shift is measured with: the stiffness is that of drives in `cfplan execute`.
+_FRICTION = 0.1
+_DRIVE_STIFFNESS = 330.0
 # Step, in radians and object sizes, at which margins are looked at.
 _FINE = 0.01
 
@@ -52,6 +62,7 @@ class Ratios(NamedTuple):
     hold: FloatArray
     torque: FloatArray
     limits: FloatArray
+    stiffness: FloatArray
     clearance: FloatArray
 
     @property
@@ -102,8 +113,8 @@ class Robustness:
 
     def _steady(
         self, formation: Formation, z: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Ratios of force, hold, torque and limits, each of shape (s,)."""
+    ) -> tuple[FloatArray, ...]:
+        """Ratios of force, hold, torque, limits and stiffness, each of shape (s,)."""
         system = self.system
         placed = system.place(z)
         gradients = gap_gradients(system, placed, formation.array)
@@ -114,6 +125,7 @@ class Robustness:
             np.maximum(self._hold(formation, z, placed, gradients), 0.0) / _COMFORTABLE_HOLD,
             self._torque(gradients, z) / _COMFORTABLE_TORQUE,
             room / _COMFORTABLE_LIMIT,
+            _COMFORTABLE_SHIFT / np.maximum(self._shift(formation, placed, gradients), 1e-9),
         )
 
     def _clearance(self, parts: Sequence[FloatArray]) -> FloatArray:
@@ -147,6 +159,25 @@ class Robustness:
             settled = unbalanced_margin(wrenches, rates, system.load) - rest
             hold = np.maximum(hold, settled)
         return hold
+
+    def _shift(
+        self, formation: Formation, placed: Placement, gradients: FloatArray
+    ) -> FloatArray:
+        """Largest shift of the object by friction; shape (s,)."""
+        system, pairs = self.system, formation.array
+        wrenches = gradients[..., :3]
+        if is_second_order(pairs):
+            forces, _ = pair_forces(wrenches, system.load)
+        else:
+            forces = least_forces(wrenches, system.load)
+        shifts = friction_shifts(
+            gradients,
+            offset_gradients(system, placed, pairs),
+            gap_hessians(system, placed, pairs),
+            np.nan_to_num(forces),
+            _DRIVE_STIFFNESS,
+        )
+        return np.where(np.isnan(forces).any(axis=1), np.inf, _FRICTION * shifts)
 
     def _torque(self, gradients: FloatArray, z: FloatArray) -> FloatArray:
         """Width of the narrowest interval of torques that has to be held."""
