@@ -15,7 +15,7 @@ from cfplan_core.planning.mesh_margins import MeshMargins
 from cfplan_core.planning.mesh_search import MeshSearch, Way
 from cfplan_core.planning.pieces import Piece
 from cfplan_core.planning.roadmap import Roadmap
-from cfplan_core.planning.robustness import Robustness, finer
+from cfplan_core.planning.robustness import Robustness
 from cfplan_core.planning.search import Leg
 from cfplan_core.planning.straightening import legs_of, straightened
 from cfplan_core.planning.ways import joint_length
@@ -156,8 +156,7 @@ class BestOnMesh:
         return Best(legs, way, max(margin, bound))
 
     def _keeps(self, leg: Leg, floor: float) -> bool:
-        points = finer(self._expanded(leg.points))
-        return bool(self._robustness.steady(leg.formation, points).min() >= floor)
+        return self._robustness.moving(leg.formation, self._expanded(leg.points)) >= floor
 
     def _leave_out(
         self, way: Way, pieces: set[int], refused: Callable[[list[Leg]], list[int]]

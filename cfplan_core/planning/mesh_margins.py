@@ -13,7 +13,12 @@ from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.planning.mesh import Mesh, Motion
 from cfplan_core.planning.near_misses import TOUCHING, distances
-from cfplan_core.planning.robustness import COMFORTABLE_CLEARANCE, Robustness, finer
+from cfplan_core.planning.robustness import (
+    COMFORTABLE_CLEARANCE,
+    Robustness,
+    finer,
+    steps_along,
+)
 
 # Motions that are measured at once.
 _AT_ONCE = 4000
@@ -25,12 +30,12 @@ class Marks:
 
     Attributes:
         near: For each node the pairs that are nearer than the margin allows.
-        passed: For each motion that is wide enough the pairs that are so anywhere on it, and
-            those that touch anywhere on it.
+        passed: For each motion that is wide enough backwards, and for each that is so forwards,
+            the pairs that are so anywhere on it, and those that touch anywhere on it.
     """
 
     near: list[int]
-    passed: dict[Motion, tuple[int, int]]
+    passed: tuple[dict[Motion, tuple[int, int]], dict[Motion, tuple[int, int]]]
 
     def follow(self, node: int, other: int, motion: Motion, touched: int) -> int | None:
         """Follow a motion from one of its nodes to the other.
@@ -45,7 +50,7 @@ class Marks:
             The same for its end; None if something would be missed by too little, or the motion
             is not wide enough.
         """
-        found = self.passed.get(motion)
+        found = self.passed[other == motion.second].get(motion)
         if found is None:
             return None
         near, touching = found
@@ -59,7 +64,8 @@ class MeshMargins:
     """Margins of all motions of a mesh.
 
     Attributes:
-        steady: Smallest ratio but for the clearance on each motion, shape (m,).
+        widths: Smallest ratio but for the clearance on each motion backwards and forwards, shape
+            (2, m).
     """
 
     def __init__(
@@ -80,7 +86,7 @@ class MeshMargins:
         system = robustness.system
         self._motions = mesh.motions
         count = len(mesh.motions)
-        self.steady = np.full(count, np.inf)
+        self.widths = np.full((2, count), np.inf)
         self._nearest = np.empty((count, len(system.pair_edge)), dtype=np.float32)
         self._touches = np.empty(self._nearest.shape, dtype=bool)
         self._at_nodes = distances(system, expanded(np.array(mesh.z)))[0]
@@ -94,8 +100,13 @@ class MeshMargins:
                 parts = [mesh.motions[k].points for k in some]
                 if formation is not None:
                     inner = [finer(part) for part in parts]
-                    steady = robustness.steady(formation, expanded(np.concatenate(inner)))
-                    self.steady[some] = np.minimum.reduceat(steady, _begins(inner))
+                    points = expanded(np.concatenate(inner))
+                    steady = robustness.steady(formation, points)
+                    steps = np.concatenate([steps_along(expanded(part)) for part in inner])
+                    for way, sign in enumerate((-1.0, 1.0)):
+                        friction = robustness.friction(formation, points, sign * steps)
+                        width = np.minimum(steady, friction)
+                        self.widths[way, some] = np.minimum.reduceat(width, _begins(inner))
                 points, begins = expanded(np.concatenate(parts)), _begins(parts)
                 distance, passing = distances(system, points)
                 self._touches[some] = np.logical_or.reduceat(distance < TOUCHING, begins, axis=0)
@@ -106,13 +117,19 @@ class MeshMargins:
     def marks(self, floor: float) -> Marks:
         """Say what a way of a margin of at least the floor has to mind."""
         near = min(floor, 1.0) * COMFORTABLE_CLEARANCE
-        wide = np.flatnonzero(self.steady >= floor)
-        passing = _bits(self._nearest[wide] < near)
-        touching = _bits(self._touches[wide])
-        return Marks(
-            _bits(self._at_nodes < near),
-            {self._motions[k]: (passing[n], touching[n]) for n, k in enumerate(wide.tolist())},
+        wide = self.widths >= floor
+        some = np.flatnonzero(wide.any(axis=0))
+        passing = _bits(self._nearest[some] < near)
+        touching = _bits(self._touches[some])
+        backwards, forwards = (
+            {
+                self._motions[k]: (passing[n], touching[n])
+                for n, k in enumerate(some.tolist())
+                if way[k]
+            }
+            for way in wide
         )
+        return Marks(_bits(self._at_nodes < near), (backwards, forwards))
 
 
 def _begins(parts: Sequence[FloatArray]) -> IntArray:

@@ -159,7 +159,9 @@ class MeshSearch:
 
     def _widest_steady(self, margins: MeshMargins) -> float:
         """Largest margin of a way where the clearance is left out (Pollack, 1960)."""
-        width = dict(zip(self._mesh.motions, margins.steady.tolist(), strict=True))
+        back, ahead = (
+            dict(zip(self._mesh.motions, way, strict=True)) for way in margins.widths.tolist()
+        )
         best = [0.0] * len(self._mesh.z)
         best[self._start] = float('inf')
         queue = [(-best[self._start], self._start)]
@@ -170,6 +172,7 @@ class MeshSearch:
             if node in self._goals:
                 return -so_far
             for other, motion in self._mesh.around[node]:
+                width = ahead if other == motion.second else back
                 through = min(-so_far, width[motion])
                 if motion not in self.banned and through > best[other]:
                     best[other] = through

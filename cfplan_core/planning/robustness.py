@@ -1,13 +1,15 @@
 """How far a motion is from what would spoil it, as one number.
 
-The margin is the smallest of six ratios; 1 is comfortable, 0 is the border of what works:
+The margin is the smallest of seven ratios; 1 is comfortable, 0 is the border of what works:
 
 - force: 1 / F, where F is the needed force in weights of the object;
 - hold: the stability margin, the distance of W's columns and f from no longer spanning R³, / 0.2;
   for two contacts that of second order, the smallest of the energy's curvature, the two forces
   and the sine between the wrenches. Where other contacts stop pressing and the object settles onto
   two of them, these two count if that is more, less the load that they leave to the others;
-- stiffness: 0.005 / the largest shift of the object, in object sizes and rad, by friction of 0.1
+- friction: the largest coefficient of friction against the motion with which the contacts still
+  hold the object (`friction_limits`), / 0.2; where the object settles onto two of them as for hold;
+- stiffness: 0.01 / the largest shift of the object, in object sizes and rad, by friction of 0.1
   where drives of 330 weights times sizes per rad hold the joints; 0 where such drives are too soft
   to keep the object stable (`friction_shifts`);
 - clearance: the smallest distance of a near miss, in object sizes, / 0.1. A near miss is a vertex
@@ -17,8 +19,9 @@ The margin is the smallest of six ratios; 1 is comfortable, 0 is the border of w
   within the effort limits, in weights times sizes, / 0.2. Three contacts need none;
 - limits: the distance of the joints from their limits, in rad, / 0.1.
 
-All but the clearance are properties of a configuration: no plan has a larger margin than its start
-and its goal. `docs/optimality.md` says why these.
+All but clearance and friction are properties of a configuration: no plan has a larger margin than
+its start and its goal. Clearance is that of a whole path, and friction depends on which way it goes,
+so that a plan backwards has another margin. `docs/optimality.md` says why these.
 """
 
 from __future__ import annotations
@@ -37,17 +40,19 @@ from cfplan_core.contact.system import ContactSystem, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_forces import least_forces
 from cfplan_core.mechanics.contact_model import ContactModel
+from cfplan_core.mechanics.friction_limit import friction_limits
 from cfplan_core.mechanics.friction_shift import friction_shifts
 from cfplan_core.mechanics.second_order import pair_forces, unbalanced_margin
 from cfplan_core.planning.equations import is_second_order
 from cfplan_core.planning.near_misses import near_misses
 from cfplan_core.planning.tracing import stability_margins
 
-_COMFORTABLE_HOLD = 0.2
+_COMFORTABLE_HOLD = 0.1
 COMFORTABLE_CLEARANCE = 0.1
 _COMFORTABLE_TORQUE = 0.2
 _COMFORTABLE_LIMIT = 0.1
-_COMFORTABLE_SHIFT = 0.005
+_COMFORTABLE_SHIFT = 0.01
+_COMFORTABLE_FRICTION = 0.2
 # What the shift is measured with: the stiffness is that of drives in `cfplan execute`.
 _FRICTION = 0.1
 _DRIVE_STIFFNESS = 330.0
@@ -63,6 +68,7 @@ class Ratios(NamedTuple):
     torque: FloatArray
     limits: FloatArray
     stiffness: FloatArray
+    friction: FloatArray
     clearance: FloatArray
 
     @property
@@ -92,10 +98,14 @@ class Robustness:
             formation: The contacts that are kept.
             z: Shape (s, 3 + n), in order.
         """
-        return Ratios(*self._steady(formation, z), clearance=self._clearance([z]))
+        return Ratios(
+            *self._steady(formation, z),
+            friction=self.friction(formation, z, steps_along(z)),
+            clearance=self._clearance([z]),
+        )
 
     def steady(self, formation: Formation, z: FloatArray) -> FloatArray:
-        """Smallest ratio at each configuration without the clearance, which is of a motion.
+        """Smallest ratio at each configuration of those that do not depend on a motion.
 
         Args:
             formation: The contacts that are kept.
@@ -103,17 +113,44 @@ class Robustness:
         """
         return np.asarray(np.minimum.reduce(self._steady(formation, z)))
 
+    def friction(self, formation: Formation, z: FloatArray, steps: FloatArray) -> FloatArray:
+        """Ratio of the friction that the contacts bear in a motion; shape (s,).
+
+        Args:
+            formation: The contacts that are kept.
+            z: Shape (s, 3 + n), in any order.
+            steps: Shape (s, 3 + n), direction of the motion at each of them.
+        """
+        if is_second_order(formation.pairs):
+            return np.full(len(z), np.inf)
+        system, pairs = self.system, formation.array
+        placed = system.place(z)
+        gradients = gap_gradients(system, placed, pairs)
+        slides = offset_gradients(system, placed, pairs)
+        limits = friction_limits(gradients, slides, steps, system.load, _COMFORTABLE_FRICTION)
+        settled = self._settled(formation, placed, gradients) / _COMFORTABLE_HOLD
+        return np.maximum(limits / _COMFORTABLE_FRICTION, settled)
+
     def margin(self, legs: Sequence[tuple[Formation, FloatArray]]) -> float:
         """Margin of motions one after the other, each a formation and points, (s, 3 + n).
 
         No more than the smallest of theirs: a near miss may take more than one.
         """
-        steady = min(float(self.steady(formation, finer(z)).min()) for formation, z in legs)
-        return min(steady, float(self._clearance([z for _, z in legs]).min()))
+        moving = min(self.moving(formation, z) for formation, z in legs)
+        return min(moving, float(self._clearance([z for _, z in legs]).min()))
 
-    def _steady(
-        self, formation: Formation, z: FloatArray
-    ) -> tuple[FloatArray, ...]:
+    def moving(self, formation: Formation, z: FloatArray) -> float:
+        """Smallest ratio but for the clearance on a motion, looked at in fine steps.
+
+        Args:
+            formation: The contacts that are kept.
+            z: Shape (s, 3 + n), in order.
+        """
+        z = finer(z)
+        friction = self.friction(formation, z, steps_along(z))
+        return float(np.minimum(self.steady(formation, z), friction).min())
+
+    def _steady(self, formation: Formation, z: FloatArray) -> tuple[FloatArray, ...]:
         """Ratios of force, hold, torque, limits and stiffness, each of shape (s,)."""
         system = self.system
         placed = system.place(z)
@@ -147,22 +184,27 @@ class Robustness:
 
         That of two contacts is there also where these only nearly balance the object.
         """
-        system, model, pairs = self.system, self._model, formation.array
-        hold = stability_margins(system, model, z, gradients, pairs).stable
-        if not model.second_order:
-            return hold
+        system, model = self.system, self._model
+        hold = stability_margins(system, model, z, gradients, formation.array).stable
+        return np.maximum(hold, self._settled(formation, placed, gradients))
+
+    def _settled(
+        self, formation: Formation, placed: Placement, gradients: FloatArray
+    ) -> FloatArray:
+        """Stability margin of two of the contacts, at best, less what they do not carry."""
+        system, pairs = self.system, formation.array
+        found = np.full(len(gradients), -np.inf)
+        if not self._model.second_order:
+            return found
         for chosen in combinations(range(len(pairs)), 2):
             two = list(chosen)
             rates = wrench_rates(system, placed, pairs[two])
             wrenches = gradients[:, two, :3]
             _, rest = pair_forces(wrenches, system.load)
-            settled = unbalanced_margin(wrenches, rates, system.load) - rest
-            hold = np.maximum(hold, settled)
-        return hold
+            found = np.maximum(found, unbalanced_margin(wrenches, rates, system.load) - rest)
+        return found
 
-    def _shift(
-        self, formation: Formation, placed: Placement, gradients: FloatArray
-    ) -> FloatArray:
+    def _shift(self, formation: Formation, placed: Placement, gradients: FloatArray) -> FloatArray:
         """Largest shift of the object by friction; shape (s,)."""
         system, pairs = self.system, formation.array
         wrenches = gradients[..., :3]
@@ -189,7 +231,8 @@ class Robustness:
         lower, upper = self._model.torque_limits(gradients)
         lower = np.maximum(lower + weight, -self._effort)
         upper = np.minimum(upper + weight, self._effort)
-        widths = np.sort(np.nan_to_num(np.maximum(upper - lower, 0.0)), axis=1)
+        widths = np.maximum(upper - lower, 0.0)
+        widths = np.sort(np.where(np.isnan(widths), 0.0, widths), axis=1)
         return np.asarray(widths[:, -min(spare, joints)])
 
 
@@ -206,3 +249,19 @@ def finer(z: FloatArray) -> FloatArray:
         for begin, step, count in zip(z, steps, parts, strict=False)
     ]
     return np.concatenate([*inner, z[-1:]])
+
+
+def steps_along(z: FloatArray) -> FloatArray:
+    """Direction of a motion at its points: towards the next one, at the last from the one before.
+
+    Args:
+        z: Shape (s, 3 + n), successive points.
+
+    Returns:
+        As z; zero for a single point.
+    """
+    steps = np.zeros_like(z)
+    if len(z) > 1:
+        steps[:-1] = np.diff(z, axis=0)
+        steps[-1] = steps[-2]
+    return steps
