@@ -23,6 +23,7 @@ from cfplan_core.trajectory.torque_profile import POSITION
 # 0.1 kg and 6 cm about 20 N·m/rad.
 _STIFFNESS = 330.0
 _DAMPING_RATIO = 1.0
+_COMPLIANCE = 0.03
 _REST = 0.5
 _EXACT = Tolerance(1e-3, 0.02)
 _DISTURBED = Tolerance(2e-3, 0.05)
@@ -46,7 +47,7 @@ class ExecutionOptions:
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
     seed: int = 0
     gain: float | None = None
-    roles: bool = False
+    roles: bool = True
     time_step: float = 5e-4
     sampling: float = 5e-3
 
@@ -128,7 +129,11 @@ class Executor:
         stiffness = options.gain if options.gain is not None else _STIFFNESS * unit
         inertia = problem.object.mass * self.system.size**2
         damping = 2.0 * _DAMPING_RATIO * np.sqrt(stiffness * inertia)
-        self.gains = Gains(np.full(joints, stiffness), np.zeros(joints), np.full(joints, damping))
+        self.gains = Gains(
+            np.full(joints, stiffness),
+            np.full(joints, _COMPLIANCE * stiffness),
+            np.full(joints, damping),
+        )
         self.reference = build_reference(
             self.system,
             result,
