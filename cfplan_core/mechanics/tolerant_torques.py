@@ -32,8 +32,8 @@ from cfplan_core.mechanics.central_forces import interval
 
 _SINGULAR = 1e-9
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-# To 1e-5 of the interval.
-_SECTIONS = 24
+# To 5e-4 of the interval.
+_SECTIONS = 16
 
 
 class Tolerance(NamedTuple):
@@ -72,7 +72,7 @@ def most_tolerant(
     matrix = _columns(gradients, rows)
     regular = np.abs(np.linalg.det(matrix)) > _SINGULAR
     matrix[~regular] = np.eye(4)
-    inverse = np.linalg.inv(matrix)
+    inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     base, slope = -inverse[:, :, :3] @ load, inverse[:, :, 3]
     response = _responses(gradients, disturbance, joint, inverse)
     steady = MASS * np.abs(base) + TORQUE * np.abs(slope)
