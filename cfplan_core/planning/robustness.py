@@ -32,10 +32,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cfplan_core.contact.curvature import wrench_rates
+from cfplan_core.contact.curvature import gap_hessians, wrench_rates
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.gaps import gap_gradients, offset_gradients
-from cfplan_core.contact.hessians import gap_hessians
 from cfplan_core.contact.system import ContactSystem, Placement
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_forces import least_forces
@@ -48,7 +47,7 @@ from cfplan_core.planning.near_misses import near_misses
 from cfplan_core.planning.tracing import stability_margins
 
 _COMFORTABLE_HOLD = 0.1
-COMFORTABLE_CLEARANCE = 0.1
+COMFORTABLE_CLEARANCE = 0.05
 _COMFORTABLE_TORQUE = 0.2
 _COMFORTABLE_LIMIT = 0.1
 _COMFORTABLE_SHIFT = 0.01
