@@ -156,7 +156,7 @@ class BestOnMesh:
         return Best(legs, way, max(margin, bound))
 
     def _keeps(self, leg: Leg, floor: float) -> bool:
-        return self._robustness.moving(leg.formation, self._expanded(leg.points)) >= floor
+        return self._robustness.width(leg.formation, self._expanded(leg.points)) >= floor
 
     def _leave_out(
         self, way: Way, pieces: set[int], refused: Callable[[list[Leg]], list[int]]

@@ -101,12 +101,9 @@ class MeshMargins:
                 if formation is not None:
                     inner = [finer(part) for part in parts]
                     points = expanded(np.concatenate(inner))
-                    steady = robustness.steady(formation, points)
                     steps = np.concatenate([steps_along(expanded(part)) for part in inner])
-                    for way, sign in enumerate((-1.0, 1.0)):
-                        friction = robustness.friction(formation, points, sign * steps)
-                        width = np.minimum(steady, friction)
-                        self.widths[way, some] = np.minimum.reduceat(width, _begins(inner))
+                    widths = robustness.widths(formation, points, steps)
+                    self.widths[:, some] = np.minimum.reduceat(widths, _begins(inner), axis=1)
                 points, begins = expanded(np.concatenate(parts)), _begins(parts)
                 distance, passing = distances(system, points)
                 self._touches[some] = np.logical_or.reduceat(distance < TOUCHING, begins, axis=0)

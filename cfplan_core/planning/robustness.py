@@ -47,7 +47,9 @@ from cfplan_core.planning.near_misses import near_misses
 from cfplan_core.planning.tracing import stability_margins
 
 _COMFORTABLE_HOLD = 0.1
-COMFORTABLE_CLEARANCE = 0.05
+# Of more than three contacts: how hard they press can be chosen.
+_COMFORTABLE_HOLD_OF_MANY = 0.05
+COMFORTABLE_CLEARANCE = 0.1
 _COMFORTABLE_TORQUE = 0.2
 _COMFORTABLE_LIMIT = 0.1
 _COMFORTABLE_SHIFT = 0.01
@@ -97,48 +99,30 @@ class Robustness:
             formation: The contacts that are kept.
             z: Shape (s, 3 + n), in order.
         """
-        return Ratios(
-            *self._steady(formation, z),
-            friction=self.friction(formation, z, steps_along(z)),
-            clearance=self._clearance([z]),
-        )
+        placed, gradients = self._placed(formation, z)
+        settled = self._settled(formation, placed, gradients)
+        _, friction = self._friction(formation, placed, gradients, settled, steps_along(z))
+        steady = self._steady(formation, z, placed, gradients, settled)
+        return Ratios(*steady, friction=friction, clearance=self._clearance([z]))
 
-    def steady(self, formation: Formation, z: FloatArray) -> FloatArray:
-        """Smallest ratio at each configuration of those that do not depend on a motion.
-
-        Args:
-            formation: The contacts that are kept.
-            z: Shape (s, 3 + n), in any order.
-        """
-        return np.asarray(np.minimum.reduce(self._steady(formation, z)))
-
-    def friction(self, formation: Formation, z: FloatArray, steps: FloatArray) -> FloatArray:
-        """Ratio of the friction that the contacts bear in a motion; shape (s,).
+    def widths(self, formation: Formation, z: FloatArray, steps: FloatArray) -> FloatArray:
+        """Smallest ratio at each configuration without the clearance, which is of a whole path.
 
         Args:
             formation: The contacts that are kept.
             z: Shape (s, 3 + n), in any order.
             steps: Shape (s, 3 + n), direction of the motion at each of them.
+
+        Returns:
+            Shape (2, s): of the motion backwards and as it is.
         """
-        if is_second_order(formation.pairs):
-            return np.full(len(z), np.inf)
-        system, pairs = self.system, formation.array
-        placed = system.place(z)
-        gradients = gap_gradients(system, placed, pairs)
-        slides = offset_gradients(system, placed, pairs)
-        limits = friction_limits(gradients, slides, steps, system.load, _COMFORTABLE_FRICTION)
-        settled = self._settled(formation, placed, gradients) / _COMFORTABLE_HOLD
-        return np.maximum(limits / _COMFORTABLE_FRICTION, settled)
+        placed, gradients = self._placed(formation, z)
+        settled = self._settled(formation, placed, gradients)
+        steady = np.minimum.reduce(self._steady(formation, z, placed, gradients, settled))
+        friction = self._friction(formation, placed, gradients, settled, steps)
+        return np.minimum(steady, friction)
 
-    def margin(self, legs: Sequence[tuple[Formation, FloatArray]]) -> float:
-        """Margin of motions one after the other, each a formation and points, (s, 3 + n).
-
-        No more than the smallest of theirs: a near miss may take more than one.
-        """
-        moving = min(self.moving(formation, z) for formation, z in legs)
-        return min(moving, float(self._clearance([z for _, z in legs]).min()))
-
-    def moving(self, formation: Formation, z: FloatArray) -> float:
+    def width(self, formation: Formation, z: FloatArray) -> float:
         """Smallest ratio but for the clearance on a motion, looked at in fine steps.
 
         Args:
@@ -146,23 +130,58 @@ class Robustness:
             z: Shape (s, 3 + n), in order.
         """
         z = finer(z)
-        friction = self.friction(formation, z, steps_along(z))
-        return float(np.minimum(self.steady(formation, z), friction).min())
+        return float(self.widths(formation, z, steps_along(z))[1].min())
 
-    def _steady(self, formation: Formation, z: FloatArray) -> tuple[FloatArray, ...]:
+    def margin(self, legs: Sequence[tuple[Formation, FloatArray]]) -> float:
+        """Margin of motions one after the other, each a formation and points, (s, 3 + n).
+
+        No more than the smallest of theirs: a near miss may take more than one.
+        """
+        width = min(self.width(formation, z) for formation, z in legs)
+        return min(width, float(self._clearance([z for _, z in legs]).min()))
+
+    def _placed(self, formation: Formation, z: FloatArray) -> tuple[Placement, FloatArray]:
+        """Where everything is, and the gradients of the contacts' gaps."""
+        placed = self.system.place(z)
+        return placed, gap_gradients(self.system, placed, formation.array)
+
+    def _steady(
+        self,
+        formation: Formation,
+        z: FloatArray,
+        placed: Placement,
+        gradients: FloatArray,
+        settled: FloatArray,
+    ) -> tuple[FloatArray, ...]:
         """Ratios of force, hold, torque, limits and stiffness, each of shape (s,)."""
-        system = self.system
-        placed = system.place(z)
-        gradients = gap_gradients(system, placed, formation.array)
+        system, model = self.system, self._model
         joints = z[:, 3:]
         room = np.minimum(joints - system.lower, system.upper - joints).min(axis=1)
+        hold = stability_margins(system, model, z, gradients, formation.array).stable
+        firm = _COMFORTABLE_HOLD if len(formation.pairs) <= 3 else _COMFORTABLE_HOLD_OF_MANY
         return (
             1.0 / np.maximum(self._force(gradients), 1e-9),
-            np.maximum(self._hold(formation, z, placed, gradients), 0.0) / _COMFORTABLE_HOLD,
+            np.maximum(np.maximum(hold, 0.0) / firm, settled / _COMFORTABLE_HOLD),
             self._torque(gradients, z) / _COMFORTABLE_TORQUE,
             room / _COMFORTABLE_LIMIT,
             _COMFORTABLE_SHIFT / np.maximum(self._shift(formation, placed, gradients), 1e-9),
         )
+
+    def _friction(
+        self,
+        formation: Formation,
+        placed: Placement,
+        gradients: FloatArray,
+        settled: FloatArray,
+        steps: FloatArray,
+    ) -> FloatArray:
+        """Ratio of friction in motions backwards and as they are; shape (2, s)."""
+        if is_second_order(formation.pairs):
+            return np.full((2, len(steps)), np.inf)
+        slides = offset_gradients(self.system, placed, formation.array)
+        load, most = self.system.load, _COMFORTABLE_FRICTION
+        limits = [friction_limits(gradients, slides, way, load, most) for way in (-steps, steps)]
+        return np.maximum(np.array(limits) / most, settled / _COMFORTABLE_HOLD)
 
     def _clearance(self, parts: Sequence[FloatArray]) -> FloatArray:
         """Ratio of the near misses on a path, at its points; shape (s,)."""
@@ -176,21 +195,13 @@ class Robustness:
         forces, _ = pair_forces(gradients[..., :3], self.system.load)
         return np.asarray(forces.max(axis=1))
 
-    def _hold(
-        self, formation: Formation, z: FloatArray, placed: Placement, gradients: FloatArray
-    ) -> FloatArray:
-        """Stability margin, of two contacts where that is more; shape (s,).
-
-        That of two contacts is there also where these only nearly balance the object.
-        """
-        system, model = self.system, self._model
-        hold = stability_margins(system, model, z, gradients, formation.array).stable
-        return np.maximum(hold, self._settled(formation, placed, gradients))
-
     def _settled(
         self, formation: Formation, placed: Placement, gradients: FloatArray
     ) -> FloatArray:
-        """Stability margin of two of the contacts, at best, less what they do not carry."""
+        """Stability margin of two of the contacts at best, less what they leave to the others.
+
+        That of two contacts is there also where these only nearly balance the object; shape (s,).
+        """
         system, pairs = self.system, formation.array
         found = np.full(len(gradients), -np.inf)
         if not self._model.second_order:
