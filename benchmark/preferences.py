@@ -26,7 +26,9 @@ NAMES = [
     *('h013', 'h020', 'h045', 'h1004', 'h1181', 'h120', 'h122', 'h205', 'h447'),
     'trinkle_hunter_1991',
 ]
-TERMS = ('force', 'hold', 'torque', 'limits')
+# Those of a configuration, and those of a motion.
+TERMS = ('force', 'hold', 'stiffness', 'torque', 'limits')
+OF_MOTIONS = ('friction', 'clearance')
 
 
 # A plan this near the bound, as a part of it, is as good as any.
@@ -74,7 +76,7 @@ def _compared(problem: Problem, first: PlanResult, robust: PlanResult) -> str:
             f'{name}, {", ".join(part.contacts)}'.replace('|', '\\|'),
         )
         for segment, part in zip(rated, robust.segments, strict=True)
-        for name in (*TERMS, 'clearance')
+        for name in (*TERMS, *OF_MOTIONS)
     )
     best = robust.margin >= (1.0 - PROOF) * robust.margin_bound
     cells = [

@@ -1,14 +1,13 @@
 """How much friction against the motion contacts bear before one of them lets go.
 
 A contact that slides with the rate s_i along its edge meets a friction of μ c_i against it, so
-that it pushes along w_i − μ sgn(s_i) t_i, where t_i is the gradient of its place on the edge by the
-object's pose. The contacts keep holding the object while the load is in the cone of these,
+that it pushes along w_i − μ sgn(s_i) t_i, where t_i is the gradient of its place on the edge by
+the object's pose. The contacts hold the object while the load is in the cone of these,
 
     Σ c_i (w_i − μ sgn(s_i) t_i) = −f,  c ≥ 0.
 
-Beyond the μ where it leaves the cone friction carries what a contact should: the object lags behind,
-and that contact opens. Unlike the other measures of a grasp this one depends on the direction of
-the motion.
+Where μ is larger friction carries what a contact should: the object lags behind, and that contact
+opens. Unlike other measures of a grasp this one depends on the direction of the motion.
 """
 
 from __future__ import annotations

@@ -6,17 +6,18 @@ object free to move along the motions B that keep the contacts, J θ̇ + Wᵀ q�
     K = κ B_θᵀ B_θ − Bᵀ (Σ c_i ∇²g_i) B,
 
 where the second part is how contact forces turn with the motion. Friction at contact i does the
-work of a force of at most μ c_i along the gradient o_i of the contact's place on its edge. To first
-order in μ it shifts the object by at most
+work of a force of at most μ c_i along the gradient o_i of the contact's place on its edge. To
+first order in μ it shifts the object by at most
 
     μ Σ c_i |B_q K⁻¹ Bᵀ o_i|.
 
 Where K is not positive definite the object is not stable although it is for rigid joints: it falls
-into another equilibrium, with the joints pushed aside, also without friction.
+into another equilibrium, with the joints pushed aside, also without friction. The links' weight is
+left out of K.
 
-Motions of the object are large beside those of the joints where the wrenches of three contacts
-nearly depend on each other. Two contacts leave a motion to the object for fixed joints; there the
-curvature of the energy alone is what resists.
+The object moves far where the joints move little if the wrenches of three contacts nearly depend
+on each other: B_q is large beside B_θ. Two contacts leave a motion to the object for fixed joints;
+there the curvature of the energy alone resists.
 """
 
 from __future__ import annotations

@@ -3,12 +3,13 @@
 The margin is the smallest of seven ratios; 1 is comfortable, 0 is the border of what works:
 
 - force: 1 / F, where F is the needed force in weights of the object;
-- hold: the stability margin, the distance of W's columns and f from no longer spanning R³, / 0.2;
-  for two contacts that of second order, the smallest of the energy's curvature, the two forces
-  and the sine between the wrenches. Where other contacts stop pressing and the object settles onto
-  two of them, these two count if that is more, less the load that they leave to the others;
+- hold: the stability margin, the distance of W's columns and f from no longer spanning R³, / 0.1
+  of three contacts, / 0.05 of more, which can be pressed harder; for two contacts that of second
+  order, the smallest of the energy's curvature, the two forces and the sine between the wrenches,
+  / 0.1. Where other contacts stop pressing and the object settles onto two of them, these two
+  count if that is more, less the load that they leave to the others;
 - friction: the largest coefficient of friction against the motion with which the contacts still
-  hold the object (`friction_limits`), / 0.2; where the object settles onto two of them as for hold;
+  hold the object (`friction_limits`), / 0.2; for two contacts as for hold;
 - stiffness: 0.01 / the largest shift of the object, in object sizes and rad, by friction of 0.1
   where drives of 330 weights times sizes per rad hold the joints; 0 where such drives are too soft
   to keep the object stable (`friction_shifts`);
@@ -20,8 +21,8 @@ The margin is the smallest of seven ratios; 1 is comfortable, 0 is the border of
 - limits: the distance of the joints from their limits, in rad, / 0.1.
 
 All but clearance and friction are properties of a configuration: no plan has a larger margin than
-its start and its goal. Clearance is that of a whole path, and friction depends on which way it goes,
-so that a plan backwards has another margin. `docs/optimality.md` says why these.
+its start and its goal. Clearance is that of a whole path, and friction depends on which way it
+goes, so that a plan backwards has another margin. `docs/optimality.md` says why these.
 """
 
 from __future__ import annotations

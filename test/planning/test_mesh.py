@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 
 from cfplan_core import load_problem
 from cfplan_core.contact.detection import touching
@@ -55,11 +55,15 @@ def search() -> MeshSearch:
     return MeshSearch(mesh, start, [goal], UNCONSTRAINED)
 
 
-def graph(motions: list[Motion]) -> csr_array:
+def graph(motions: list[Motion], floor: float = -np.inf) -> csr_array:
+    """Lengths of the motions that are at least as wide, each way."""
     best: dict[tuple[int, int], float] = {}
-    for motion in motions:
-        for edge in ((motion.first, motion.second), (motion.second, motion.first)):
-            best[edge] = min(best.get(edge, np.inf), max(motion.length, 1e-12))
+    widths = margins().widths.T if floor > -np.inf else np.zeros((len(motions), 2))
+    for motion, (back, ahead) in zip(motions, widths, strict=True):
+        first, second = motion.first, motion.second
+        for edge, width in (((first, second), ahead), ((second, first), back)):
+            if width >= floor:
+                best[edge] = min(best.get(edge, np.inf), max(motion.length, 1e-12))
     rows, columns = np.array(list(best)).T
     count = len(meshed()[1].z)
     return csr_array((list(best.values()), (rows, columns)), shape=(count, count))
@@ -101,9 +105,8 @@ def test_without_the_clearance_the_widest_margin_is_where_start_and_goal_are_jus
     widest = search()._widest_steady(margins())
 
     def connected(floor: float) -> bool:
-        wide = [m for m, s in zip(mesh.motions, margins().steady, strict=True) if s >= floor]
-        labels = connected_components(graph(wide))[1]
-        return bool(labels[start] == labels[goal])
+        lengths = dijkstra(graph(mesh.motions, floor), indices=start)
+        return bool(np.isfinite(lengths[goal]))
 
     assert connected(widest)
     assert not connected(widest * (1.0 + 1e-9))
@@ -146,20 +149,27 @@ def motion_between(first: int, second: int) -> Motion:
 
 def test_what_is_near_and_left_without_touching_bars_the_way() -> None:
     there = motion_between(0, 1)
-    marks = Marks([0b1, 0b0], {there: (0b1, 0b0)})
+    marks = Marks([0b1, 0b0], ({}, {there: (0b1, 0b0)}))
     assert marks.follow(0, 1, there, 0b0) is None
     assert marks.follow(0, 1, there, 0b1) == 0
 
 
 def test_what_touches_on_the_way_may_be_left() -> None:
     there = motion_between(0, 1)
-    assert Marks([0b0, 0b0], {there: (0b1, 0b1)}).follow(0, 1, there, 0b0) == 0
-    assert Marks([0b0, 0b0], {there: (0b1, 0b0)}).follow(0, 1, there, 0b0) is None
+    assert Marks([0b0, 0b0], ({}, {there: (0b1, 0b1)})).follow(0, 1, there, 0b0) == 0
+    assert Marks([0b0, 0b0], ({}, {there: (0b1, 0b0)})).follow(0, 1, there, 0b0) is None
+
+
+def test_a_motion_that_is_wide_enough_one_way_is_not_followed_the_other_way() -> None:
+    there = motion_between(0, 1)
+    marks = Marks([0b0, 0b0], ({}, {there: (0b0, 0b0)}))
+    assert marks.follow(0, 1, there, 0b0) == 0
+    assert marks.follow(1, 0, there, 0b0) is None
 
 
 def test_what_is_still_near_is_remembered() -> None:
     there = motion_between(0, 1)
-    assert Marks([0b11, 0b11], {there: (0b11, 0b10)}).follow(0, 1, there, 0b0) == 0b10
+    assert Marks([0b11, 0b11], ({}, {there: (0b11, 0b10)})).follow(0, 1, there, 0b0) == 0b10
 
 
 def test_a_way_over_the_mesh_has_no_nearer_miss_than_its_margin_allows() -> None:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -66,10 +68,39 @@ def test_the_margin_does_not_depend_on_how_finely_a_curve_is_sampled(piece: Piec
 
 
 @pytest.mark.parametrize('piece', CURVES, ids=lambda piece: str(piece.index))
-def test_the_margin_is_the_same_backwards(piece: Piece) -> None:
-    there = ROBUSTNESS.ratios(piece.formation, piece.points)
-    back = ROBUSTNESS.ratios(piece.formation, piece.points[::-1])
+def test_the_margin_but_for_friction_is_the_same_backwards(piece: Piece) -> None:
+    there = ROBUSTNESS.ratios(piece.formation, piece.points)._replace(friction=np.ones(1))
+    back = ROBUSTNESS.ratios(piece.formation, piece.points[::-1])._replace(friction=np.ones(1))
     assert there.worst == pytest.approx(back.worst, rel=1e-9)
+
+
+@pytest.mark.parametrize('piece', CURVES, ids=lambda piece: str(piece.index))
+def test_the_widths_of_a_motion_are_its_ratios_backwards_and_as_it_is(piece: Piece) -> None:
+    z = piece.points
+    widths = ROBUSTNESS.widths(piece.formation, z, np.gradient(z, axis=0))
+    for way, width in zip((-1, 1), widths, strict=True):
+        ratios = ROBUSTNESS.ratios(piece.formation, z[::way])._replace(clearance=np.ones(1))
+        inside = slice(2, -2)
+        steady = np.minimum.reduce([ratios.force, ratios.hold, ratios.torque, ratios.limits])
+        steady = np.minimum(steady, ratios.stiffness)[::way]
+        assert (width <= steady + 1e-9).all()
+        both = np.minimum(steady, ratios.friction[::way])
+        assert_allclose(width[inside], both[inside], rtol=0.2)
+
+
+def test_joints_without_effort_limits_are_measured_without_a_warning() -> None:
+    joints = [replace(joint, effort_limit=np.inf) for joint in STORY.hand.joints]
+    fingers = [
+        replace(finger, joints=(joint,))
+        for finger, joint in zip(STORY.hand.fingers, joints, strict=True)
+    ]
+    strong = replace(STORY, hand=replace(STORY.hand, fingers=tuple(fingers)))
+    piece = CURVES[0]
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        robustness = Robustness(ContactSystem(strong), MODEL)
+        torque = robustness.ratios(piece.formation, piece.points).torque
+    assert (torque > 0.0).all()
 
 
 def test_a_joint_near_its_limit_is_what_the_margin_tells() -> None:
