@@ -58,7 +58,7 @@ def test_object_ends_in_the_goal_with_friction_that_was_not_planned(
 
 
 def test_tips_of_thin_links_are_where_they_are_planned() -> None:
-    """A finger whose tip is 5 degrees sharp holds a square against one ledge and another."""
+    """A finger whose tip is 3.5 degrees sharp holds a square against one ledge and another."""
     outcome = _outcome('second_order/square_between_ledges', 0.0)
     assert outcome.lost == ()
     assert outcome.in_goal
