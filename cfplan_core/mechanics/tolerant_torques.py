@@ -16,7 +16,8 @@ takes force away, as its direction is known. The tolerance of τ is the largest 
 Above zero it is the ratio of a linear and a convex function of τ for each contact: quasiconcave,
 with one maximum, which is found by golden section. That torque is neither the middle of its
 interval nor as large as possible: where the interval grows without end towards form closure its
-far end is the first to be lost by an error.
+far end is the first to be lost by an error. Of the torques that tolerate nearly as much, the one
+with the smallest contact forces is taken, as in form closure the maximum is flat.
 """
 
 from __future__ import annotations
@@ -34,10 +35,13 @@ _SINGULAR = 1e-9
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 # To 5e-4 of the interval.
 _SECTIONS = 16
+# Nearly as tolerant, and how often the way there is halved.
+_ENOUGH = 0.95
+_HALVINGS = 8
 
 
 class Tolerance(NamedTuple):
-    """The torque of one joint that tolerates the largest errors.
+    """The torque of one joint that tolerates nearly the largest errors.
 
     Attributes:
         forces: Shape (s, 4), contact forces in weights.
@@ -57,7 +61,7 @@ def most_tolerant(
     limits: tuple[FloatArray, FloatArray],
     cap: FloatArray,
 ) -> Tolerance:
-    """Find the torque of a joint that tolerates the largest errors.
+    """Find the torque of a joint that tolerates nearly the largest errors, most gently.
 
     Args:
         gradients: Shape (s, 4, 3 + n), of the gaps of four contacts of rank 3.
@@ -88,9 +92,15 @@ def most_tolerant(
         return np.asarray((c / error).min(axis=1))
 
     low, high = _bounds(base, slope, -gradients[..., 3:], limits, cap)
-    best = _highest(tolerance, low, high)
-    found = np.where(regular, tolerance(best).clip(0.0), 0.0)
-    return Tolerance(forces(best), found)
+    most = _highest(tolerance, low, high)
+    enough = _ENOUGH * tolerance(most)
+    gentle = _highest(lambda torque: -forces(torque).max(axis=1), low, high)
+    for _ in range(_HALVINGS):
+        between = 0.5 * (gentle + most)
+        tolerates = tolerance(between) >= enough
+        most, gentle = np.where(tolerates, between, most), np.where(tolerates, gentle, between)
+    found = np.where(regular, tolerance(most).clip(0.0), 0.0)
+    return Tolerance(forces(most), found)
 
 
 def _columns(gradients: FloatArray, rows: list[int]) -> FloatArray:

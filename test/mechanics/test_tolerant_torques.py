@@ -22,6 +22,7 @@ from cfplan_core.mechanics.tolerant_torques import Tolerance, most_tolerant
 PROBLEMS = Path(__file__).parents[2] / 'config' / 'problems'
 PLACES = [('h045', 1), ('h045', 3), ('h447', 2), ('trinkle_hunter_1991', 1)]
 NO_LIMITS = np.full((1, 2), -99.0), np.full((1, 2), 99.0)
+NO_LIMITS_OF_THREE = np.full((3, 2), -99.0), np.full((3, 2), 99.0)
 
 
 @cache
@@ -147,3 +148,22 @@ def test_a_torque_that_tells_nothing_tolerates_nothing() -> None:
     found = most_tolerant(gradients, errors, 1, system.load, limits, np.full(3, 5.0))
     np.testing.assert_array_equal(found.tolerance, 0.0)
     assert math.isfinite(float(np.abs(found.forces).max()))
+
+
+def test_of_nearly_as_tolerant_torques_the_gentlest_is_taken() -> None:
+    """Against the first-order tolerance of torques all along the interval, by narrow limits."""
+    system, z, pairs = middle('h045', 2)
+    gradients = gap_gradients(system, system.place(z), pairs)
+    errors = disturbance(system, z, pairs)
+    cap = np.full(3, 5.0)
+    found = most_tolerant(gradients, errors, 1, system.load, NO_LIMITS_OF_THREE, cap)
+    torque = -np.einsum('skn,sk->sn', gradients[..., 3:], found.forces)[1, 1]
+    tolerances = []
+    for given in np.geomspace(0.05, 8.0, 60):
+        limits = np.array([[-99.0, given]] * 3), np.array([[99.0, given * (1.0 + 1e-9)]] * 3)
+        at = most_tolerant(gradients, errors, 1, system.load, limits, cap)
+        tolerances.append((given, at.tolerance[1]))
+    most = max(tolerance for _, tolerance in tolerances)
+    assert found.tolerance[1] >= 0.94 * most
+    gentler = [tolerance for given, tolerance in tolerances if given < 0.95 * torque]
+    assert max(gentler) < 0.96 * most
