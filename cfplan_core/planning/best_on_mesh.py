@@ -22,6 +22,9 @@ from cfplan_core.planning.ways import joint_length
 
 # The largest margin is found within this part of it.
 PRECISION = 0.01
+# Where a way does not keep its floor others are tried, each smaller by this factor.
+_SMALLER = 0.8
+_FLOORS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,19 +144,36 @@ class BestOnMesh:
             )
         low = 0.0 if known is None else self.margin(known)
         floor, bound = self._search.widest(self._margins, low, PRECISION)
-        way = self._search.shortest(floor=floor, margins=self._margins)
-        if way is None:
+        way, legs, margin = None, None, 0.0
+        for _ in range(_FLOORS):
+            # A way on which features come nearer than they are at the start may have a smaller
+            # margin than its floor: then one of a smaller floor may have a larger one.
+            found = self._search.shortest(floor=floor, margins=self._margins)
+            if found is None:
+                break
+            made, measured = self._made(found, floor)
+            if way is None or measured > margin:
+                way, legs, margin = found, made, measured
+            if floor <= max(low, margin) * (1.0 + 2.0 * PRECISION) or not np.isfinite(floor):
+                break
+            floor *= _SMALLER
+        if way is None or legs is None:
             return None if known is None else Best(list(known), bound=max(low, bound))
-        legs = legs_of(self._mesh, way)
-        straight = straightened(self._roadmap, legs, lambda leg: self._keeps(leg, floor))
-        legs = max((straight, legs), key=lambda some: min(self.margin(some), floor))
-        margin = self.margin(legs)
         if not np.isfinite(bound):
             # Nothing moves: every plan has the margin of the start at most.
             bound = margin
         if known is not None and low >= margin:
             return Best(list(known), bound=max(low, bound))
         return Best(legs, way, max(margin, bound))
+
+    def _made(self, way: Way, floor: float) -> tuple[list[Leg], float]:
+        """A way as legs, straight where that keeps a floor, and their margin."""
+        legs = legs_of(self._mesh, way)
+        straight = straightened(self._roadmap, legs, lambda leg: self._keeps(leg, floor))
+        margins = self.margin(straight), self.margin(legs)
+        if min(margins[0], floor) >= min(margins[1], floor):
+            return straight, margins[0]
+        return legs, margins[1]
 
     def _keeps(self, leg: Leg, floor: float) -> bool:
         return self._robustness.width(leg.formation, self._expanded(leg.points)) >= floor

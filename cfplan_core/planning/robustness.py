@@ -153,7 +153,7 @@ class Robustness:
         placed: Placement,
         gradients: FloatArray,
         settled: FloatArray,
-    ) -> tuple[FloatArray, ...]:
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """Ratios of force, hold, torque, limits and stiffness, each of shape (s,)."""
         system, model = self.system, self._model
         joints = z[:, 3:]
