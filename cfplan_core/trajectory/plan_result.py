@@ -110,7 +110,8 @@ class PlanResult:
         torque_nominal: Shape (f, n), N·m, what the actuators should supply: inside the limits,
             with the widest margin. Empty where it was not planned.
         entry_nominal: As `entry_lower`.
-        margin: Worst robustness margin of the plan, where it was chosen among several, else None.
+        margin: Worst robustness margin of the plan, where it was chosen among several, else None;
+            not of a plan that was reversed.
         margin_bound: No plan has a larger margin, at the resolution stated; None if not asked.
         alternatives: Other plans, the next best first, each without further ones.
         findings: Everything that is wrong, if invalid. Not in plan files.

@@ -55,6 +55,9 @@ def reversed_plan(result: PlanResult) -> PlanResult:
         ),
         trees=(goal, initial),
         alternatives=(),
+        # Friction has another direction.
+        margin=None,
+        margin_bound=None,
     )
 
 
