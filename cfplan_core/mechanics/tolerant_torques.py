@@ -78,18 +78,19 @@ def most_tolerant(
     matrix[~regular] = np.eye(4)
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     base, slope = -inverse[:, :, :3] @ load, inverse[:, :, 3]
-    response = _responses(gradients, disturbance, joint, inverse)
+    # Forces are linear in (1, τ), and so is what each error changes of them.
+    lines = np.stack([base, slope], axis=-1)
+    constant, growing = _changes(gradients, disturbance, joint, inverse, lines)
     steady = MASS * np.abs(base) + TORQUE * np.abs(slope)
-    lean = inverse @ _columns(disturbance.leaning, rows)
+    lean = inverse @ (_columns(disturbance.leaning, rows) @ lines)
 
     def forces(torque: FloatArray) -> FloatArray:
         return np.asarray(base + torque[:, None] * slope)
 
     def tolerance(torque: FloatArray) -> FloatArray:
-        c = forces(torque)
-        error = np.abs(response @ c[:, None, :, None])[..., 0].sum(axis=1) + steady
-        error += np.maximum((lean @ c[:, :, None])[..., 0], 0.0)
-        return np.asarray((c / error).min(axis=1))
+        error = np.abs(constant + torque[:, None] * growing).sum(axis=0) + steady
+        error += np.maximum(lean[..., 0] + torque[:, None] * lean[..., 1], 0.0)
+        return np.asarray((forces(torque) / error).min(axis=1))
 
     low, high = _bounds(base, slope, -gradients[..., 3:], limits, cap)
     most = _highest(tolerance, low, high)
@@ -110,10 +111,14 @@ def _columns(gradients: FloatArray, rows: list[int]) -> FloatArray:
     return columns
 
 
-def _responses(
-    gradients: FloatArray, disturbance: Disturbance, joint: int, inverse: FloatArray
-) -> FloatArray:
-    """Changes of the forces by each error, as matrices to be applied to these, (s, u, 4, 4)."""
+def _changes(
+    gradients: FloatArray,
+    disturbance: Disturbance,
+    joint: int,
+    inverse: FloatArray,
+    lines: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """What each of u errors changes of the forces lines · (1, τ): of either part, (u, s, 4)."""
     samples, count, dof = gradients.shape
     free = [0, 1, 2, 3 + joint]
     held = [d for d in range(3, dof) if d != 3 + joint]
@@ -131,7 +136,9 @@ def _responses(
         motion[:, number, d] = JOINT
     change = np.einsum('skda,sua->sukd', disturbance.hessians, motion)
     sources[:, 2 * count :] = _columns(change, free)
-    return np.asarray(inverse[:, None] @ sources)
+    changes = inverse[:, None] @ (sources @ lines[:, None])
+    constant, growing = np.ascontiguousarray(changes.transpose(3, 1, 0, 2))
+    return constant, growing
 
 
 def _bounds(
