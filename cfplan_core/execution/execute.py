@@ -9,7 +9,7 @@ import numpy as np
 
 from cfplan_core.contact.system import BoolArray, ContactSystem
 from cfplan_core.errors import CfplanError
-from cfplan_core.execution.feedforward import planned_torques
+from cfplan_core.execution.feedforward import FeedForward, planned_torques
 from cfplan_core.execution.outcome import Outcome, Tolerance, assess
 from cfplan_core.execution.perturbation import Uncertainty, World, draw
 from cfplan_core.execution.reference import Reference, build_reference
@@ -106,12 +106,19 @@ class Executor:
         problem: What was planned.
         result: Its plan.
         options: How.
+        torques: Gives the torques that are fed forward at the frames of each segment, N·m.
 
     Raises:
         CfplanError: There is no plan, or it is not the problem's.
     """
 
-    def __init__(self, problem: Problem, result: PlanResult, options: ExecutionOptions) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        result: PlanResult,
+        options: ExecutionOptions,
+        torques: FeedForward = planned_torques,
+    ) -> None:
         if not result.solved:
             raise CfplanError(
                 f'only a solved plan can be executed, status is {result.status.value}'
@@ -139,7 +146,7 @@ class Executor:
         self.reference = build_reference(
             self.system,
             result,
-            planned_torques(self.system, result),
+            torques(self.system, result),
             self._stiff(),
             options.time_step,
             _REST,

@@ -57,6 +57,13 @@ def test_object_ends_in_the_goal_with_friction_that_was_not_planned(
     assert outcome.largest_angle_deviation <= 0.1
 
 
+def test_tips_of_thin_links_are_where_they_are_planned() -> None:
+    """A finger whose tip is 3.5 degrees sharp holds a square against one ledge and another."""
+    outcome = _outcome('second_order/square_between_ledges', 0.0)
+    assert outcome.lost == ()
+    assert outcome.in_goal
+
+
 def test_jam_is_named_by_the_contact_that_was_lost() -> None:
     outcome = _outcome(*JAMS)
     assert not outcome.in_goal
