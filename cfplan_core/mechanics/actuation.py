@@ -105,8 +105,8 @@ def _tolerant(
             # At the ends of a stretch contacts are made and lost.
             inside = tolerance[own][1:-1] if own.stop - own.start > 2 else tolerance[own]
             if joint in wanted[k]:
-                margin = float(inside.min())
-                found[k].append(Actuation((joint,), np.asarray(torques[own]), margin))
+                supplied = np.where(np.isnan(torques[own]), held[k][0].torques, torques[own])
+                found[k].append(Actuation((joint,), supplied, float(inside.min())))
     best = [sorted(ways, key=lambda way: -way.margin) for ways in found]
     return [
         tuple(ways) if ways and ways[0].margin > 0.0 else before

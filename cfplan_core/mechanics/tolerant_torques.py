@@ -44,7 +44,8 @@ class Tolerance(NamedTuple):
     """The torque of one joint that tolerates nearly the largest errors.
 
     Attributes:
-        forces: Shape (s, 4), contact forces in weights.
+        forces: Shape (s, 4), contact forces in weights; nan where the joint's torque does not
+            tell them, as at a contact on the joint's axis.
         tolerance: Shape (s,), errors that are tolerated, in typical errors; 0 where no torque
             keeps all contacts, or the joint's torque does not tell the forces.
     """
@@ -101,7 +102,7 @@ def most_tolerant(
         tolerates = tolerance(between) >= enough
         most, gentle = np.where(tolerates, between, most), np.where(tolerates, gentle, between)
     found = np.where(regular, tolerance(most).clip(0.0), 0.0)
-    return Tolerance(forces(most), found)
+    return Tolerance(np.where(regular[:, None], forces(most), np.nan), found)
 
 
 def _columns(gradients: FloatArray, rows: list[int]) -> FloatArray:

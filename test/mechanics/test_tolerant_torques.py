@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import cache
 from pathlib import Path
 
@@ -147,7 +146,7 @@ def test_a_torque_that_tells_nothing_tolerates_nothing() -> None:
     errors = disturbance(system, z, pairs)
     found = most_tolerant(gradients, errors, 1, system.load, limits, np.full(3, 5.0))
     np.testing.assert_array_equal(found.tolerance, 0.0)
-    assert math.isfinite(float(np.abs(found.forces).max()))
+    assert np.isnan(found.forces).all()
 
 
 def test_of_nearly_as_tolerant_torques_the_gentlest_is_taken() -> None:
