@@ -13,10 +13,9 @@ import numpy as np
 
 from cfplan_core.contact.disturbance import Disturbance
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.mechanics.central_forces import HEADROOM, central_forces
+from cfplan_core.mechanics.central_forces import central_forces, force_caps
 from cfplan_core.mechanics.contact_model import Actuation, Holding
 from cfplan_core.mechanics.control_roles import control_roles
-from cfplan_core.mechanics.needed_force import needed_forces
 from cfplan_core.mechanics.tolerant_torques import most_tolerant
 
 # So many joints, of those whose torque may be off by most, are compared in earnest.
@@ -90,7 +89,7 @@ def _tolerant(
 ) -> list[tuple[Actuation, ...]]:
     """Ways to hold four contacts as tolerantly as can be, or `held` where that is not at all."""
     arms = -together.gradients[..., 3:]
-    cap = np.maximum(squeeze, HEADROOM * needed_forces(together.gradients[..., :3], load))
+    cap = force_caps(together.gradients[..., :3], load, squeeze)
     wanted = [
         [way.effort[0] for way in ways[:_CANDIDATES] if len(way.effort) == 1] for ways in held
     ]

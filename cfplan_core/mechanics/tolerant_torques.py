@@ -82,7 +82,8 @@ def most_tolerant(
     # Forces are linear in (1, τ), and so is what each error changes of them.
     lines = np.stack([base, slope], axis=-1)
     constant, growing = _changes(gradients, disturbance, joint, inverse, lines)
-    steady = MASS * np.abs(base) + TORQUE * np.abs(slope)
+    # Not zero where a contact never presses.
+    steady = MASS * np.abs(base) + TORQUE * np.abs(slope) + _SINGULAR
     lean = inverse @ (_columns(disturbance.leaning, rows) @ lines)
 
     def forces(torque: FloatArray) -> FloatArray:

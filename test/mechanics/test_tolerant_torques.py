@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cfplan_core import PlanResult, Problem, load_problem, plan
-from cfplan_core.contact.disturbance import GEOMETRY, JOINT, MASS, disturbance
+from cfplan_core.contact.disturbance import GEOMETRY, JOINT, MASS, Disturbance, disturbance
 from cfplan_core.contact.elements import parse_contact
 from cfplan_core.contact.gaps import gap_gradients, gaps
 from cfplan_core.contact.system import ContactSystem, IntArray
@@ -147,6 +147,19 @@ def test_a_torque_that_tells_nothing_tolerates_nothing() -> None:
     found = most_tolerant(gradients, errors, 1, system.load, limits, np.full(3, 5.0))
     np.testing.assert_array_equal(found.tolerance, 0.0)
     assert np.isnan(found.forces).all()
+
+
+def test_a_contact_that_never_presses_tolerates_nothing() -> None:
+    """Without weight and errors: two tips press a block between them, its feet nothing."""
+    gradients = np.zeros((1, 4, 5))
+    gradients[0, :, :3] = [[0, 1, -0.5], [0, 1, 0.5], [1, 0, -0.3], [-1, 0, 0.3]]
+    gradients[0, [2, 3], [3, 4]] = -0.3, -0.3
+    nothing = np.zeros_like(gradients)
+    errors = Disturbance(nothing, nothing, np.zeros((1, 4, 5, 5)), nothing)
+    with np.errstate(all='raise'):
+        found = most_tolerant(gradients, errors, 1, np.zeros(3), NO_LIMITS, np.full(1, 5.0))
+    np.testing.assert_allclose(found.forces[0, :2], 0.0, atol=1e-12)
+    np.testing.assert_allclose(found.tolerance, 0.0, atol=1e-6)
 
 
 def test_of_nearly_as_tolerant_torques_the_gentlest_is_taken() -> None:
