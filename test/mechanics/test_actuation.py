@@ -34,13 +34,17 @@ def holding(system: ContactSystem, result: PlanResult, segment: Segment, order: 
 # whatever the forces.
 @pytest.mark.parametrize('name', ['h205', 'h1004', 'goals/on_a_corner'])
 @pytest.mark.parametrize('order', [1, -1])
-def test_every_way_to_hold_a_segment_balances_the_object(name: str, order: int) -> None:
+def test_every_way_to_hold_a_segment_balances_the_object_and_the_best_comes_first(
+    name: str, order: int
+) -> None:
     problem = load_problem(PROBLEMS / f'{name}.yaml')
     result, system = plan(problem), ContactSystem(problem)
     stretches = [holding(system, result, segment, order) for segment in result.segments]
     several = 0
     for stretch, ways in zip(stretches, actuations(stretches, system.load, 5.0), strict=True):
         several += len(ways) > 1
+        margins = [way.margin for way in ways]
+        assert margins == sorted(margins, reverse=True)
         for way in ways:
             for gradients, torques in zip(stretch.gradients, way.torques, strict=True):
                 matrix = np.vstack([gradients[:, :3].T, -gradients[:, 3:].T])

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from cfplan_core import PlanResult, Problem, load_problem, plan
-from cfplan_core.contact.disturbance import GEOMETRY, JOINT, MASS, Disturbance, disturbance
+from cfplan_core.contact.disturbance import (
+    GEOMETRY,
+    JOINT,
+    MASS,
+    TORQUE,
+    Disturbance,
+    disturbance,
+)
 from cfplan_core.contact.elements import parse_contact
 from cfplan_core.contact.gaps import gap_gradients, gaps
 from cfplan_core.contact.system import ContactSystem, IntArray
@@ -42,7 +49,7 @@ def middle(name: str, segment: int) -> tuple[ContactSystem, FloatArray, IntArray
 
 def tolerant(system: ContactSystem, z: FloatArray, pairs: IntArray, joint: int) -> Tolerance:
     gradients = gap_gradients(system, system.place(z), pairs)
-    limits = tuple(np.tile(limit, (len(z), 1)) for limit in NO_LIMITS)
+    limits = tuple(np.full((len(z), system.joint_count), limit) for limit in (-99.0, 99.0))
     errors = disturbance(system, z, pairs)
     cap = np.full(len(z), 50.0)
     found = most_tolerant(gradients, errors, joint, system.load, limits, cap)  # type: ignore[arg-type]
@@ -122,6 +129,49 @@ def test_other_torques_are_lost_more_often(name: str, segment: int) -> None:
         # A maximum of one number and another, near to it, may differ by a few worlds.
         assert kept(factor) <= most + 5
     assert min(kept(0.1), kept(30.0)) < 0.8 * most
+
+
+@pytest.mark.parametrize(('name', 'segment'), PLACES)
+@pytest.mark.parametrize('joint', [0, 1])
+def test_tolerance_is_the_ratio_of_forces_to_the_sum_of_their_changes(
+    name: str, segment: int, joint: int
+) -> None:
+    """Changes by differences of forces: each error is made on its own, and the contacts closed."""
+    system, z, pairs = middle(name, segment)
+    best = tolerant(system, z, pairs, joint)
+    torque = float(torque_of(system, z[1:2], pairs, best.forces[0])[joint])
+    free = [0, 1, 2, 3 + joint]
+
+    def solved(
+        gap: FloatArray | float = 0.0,
+        held: float = 0.0,
+        change: FloatArray | float = 0.0,
+        load: float = 1.0,
+        more: float = 0.0,
+    ) -> FloatArray:
+        at = z[1].copy()
+        at[4 - joint] += held
+        for _ in range(8):
+            placed = system.place(at[None])
+            gradients = gap_gradients(system, placed, pairs)[0]
+            apart = gaps(system, placed, pairs).gap[0] + gap
+            at[free] -= np.linalg.solve(gradients[:, free], apart)
+        gradients = gradients + change
+        matrix = np.vstack([gradients[:, :3].T, -gradients[:, 3 + joint]])
+        return np.linalg.solve(matrix, np.append(-load * system.load, torque + more))
+
+    errors, step = disturbance(system, z, pairs), 1e-5
+    forces = solved()
+    disturbed = [solved(load=1.0 + MASS * step), solved(more=TORQUE * step)]
+    disturbed += [solved(held=JOINT * step)]
+    for unit in step * np.eye(4):
+        disturbed += [solved(gap=2.0 * GEOMETRY * unit)]
+        disturbed += [solved(change=unit[:, None] * errors.turned[1])]
+        disturbed += [solved(change=unit[:, None] * errors.shifted[1])]
+    by_friction = solved(change=step * errors.leaning[1]) - forces
+    error = np.abs(np.array(disturbed) - forces).sum(axis=0) - np.minimum(by_friction, 0.0)
+    expected = float((forces * step / error).min())
+    assert float(best.tolerance[0]) == pytest.approx(expected, rel=2e-3)
 
 
 def test_forces_balance_the_load_within_cap_and_efforts() -> None:
