@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+import multiprocessing
 import os
 import signal
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
+from multiprocessing import forkserver
 from types import ModuleType
 from typing import Any
 
@@ -136,6 +138,8 @@ def _connected(
     scheduler: str | None, workers: int | None, runs: int, attempts: int
 ) -> Iterator[Any]:
     """Connect to a scheduler, or start one on this machine, with workers."""
+    if scheduler is None:
+        _start_fork_server()
     distributed = import_distributed()
     # What becomes of workers is in the log of the study.
     for name in ('distributed', 'distributed.client'):
@@ -154,11 +158,23 @@ def _connected(
         yield client
 
 
-def _local_cluster(workers: int, attempts: int) -> Any:
+def _start_fork_server() -> None:
+    """Start the process that workers are forked from; it imports while this one does.
+
+    One that the program has started before stays as it is.
+    """
+    context = multiprocessing.get_context('forkserver')
+    context.set_forkserver_preload(['cfplan_core.study.worker_imports'])
+    forkserver.ensure_running()
+
+
+@contextmanager
+def _local_cluster(workers: int, attempts: int) -> Iterator[Any]:
     import dask
 
     distributed = import_distributed()
     settings = {
+        'distributed.worker.multiprocessing-method': 'forkserver',
         'distributed.scheduler.allowed-failures': attempts - 1,
         # No run is held by a worker that is busy with another: it would share that one's fate.
         'distributed.scheduler.worker-saturation': 1.0,
@@ -166,18 +182,22 @@ def _local_cluster(workers: int, attempts: int) -> Any:
         'distributed.worker.http.routes': [],
         'distributed.worker.profile.enabled': False,
     }
-    with dask.config.set(settings), warnings.catch_warnings():
-        # The port that the scheduler would like to have may be taken; nobody needs it.
-        warnings.filterwarnings('ignore', message='Port .* is already in use')
-        return distributed.LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            host=LOOPBACK,
-            dashboard_address=None,
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        )
+    # The settings hold for workers that are started anew, too.
+    with dask.config.set(settings):
+        with warnings.catch_warnings():
+            # The port that the scheduler would like to have may be taken; nobody needs it.
+            warnings.filterwarnings('ignore', message='Port .* is already in use')
+            cluster = distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host=LOOPBACK,
+                dashboard_address=None,
+                memory_limit=0,
+                silence_logs=logging.CRITICAL,
+            )
+        with cluster:
+            yield cluster
 
 
 def _deaf_to_interrupts() -> Any:
