@@ -6,9 +6,10 @@ import logging
 import multiprocessing
 import os
 import signal
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from itertools import islice
 from multiprocessing import forkserver
 from types import ModuleType
@@ -165,7 +166,22 @@ def _start_fork_server() -> None:
     """
     context = multiprocessing.get_context('forkserver')
     context.set_forkserver_preload(['cfplan_core.study.worker_imports'])
-    forkserver.ensure_running()
+    with _on_interrupt(signal.SIG_IGN):
+        # It leaves Ctrl-C, which it gets too, to the study, and so do those that it forks.
+        forkserver.ensure_running()
+
+
+@contextmanager
+def _on_interrupt(handler: Any) -> Iterator[None]:
+    """Have Ctrl-C do something else for a while; only the main thread can change that."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
@@ -182,9 +198,11 @@ def _local_cluster(workers: int, attempts: int) -> Iterator[Any]:
         'distributed.worker.http.routes': [],
         'distributed.worker.profile.enabled': False,
     }
+    interrupts: list[int] = []
     # The settings hold for workers that are started anew, too.
-    with dask.config.set(settings):
-        with warnings.catch_warnings():
+    with dask.config.set(settings), ExitStack() as stack:
+        # A cluster that is interrupted while it starts cannot be closed.
+        with _on_interrupt(lambda *_: interrupts.append(signal.SIGINT)), warnings.catch_warnings():
             # The port that the scheduler would like to have may be taken; nobody needs it.
             warnings.filterwarnings('ignore', message='Port .* is already in use')
             cluster = distributed.LocalCluster(
@@ -196,8 +214,10 @@ def _local_cluster(workers: int, attempts: int) -> Iterator[Any]:
                 memory_limit=0,
                 silence_logs=logging.CRITICAL,
             )
-        with cluster:
-            yield cluster
+            stack.enter_context(cluster)
+        if interrupts:
+            raise KeyboardInterrupt
+        yield cluster
 
 
 def _deaf_to_interrupts() -> Any:

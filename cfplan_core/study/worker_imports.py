@@ -1,18 +1,16 @@
 """What a worker needs, imported once by the process that all workers are forked from.
 
-Importing this module is what it is for. Ctrl-C is left to the study, here and in all workers.
+Importing this module is what it is for.
 """
 
 from __future__ import annotations
 
 import os
-import signal
 from contextlib import suppress
 from importlib import import_module
 
 from cfplan_core.errors import CfplanError
 
-signal.signal(signal.SIGINT, signal.SIG_IGN)
 # Libraries of linear algebra read these when they are loaded; dask sets them too late for that.
 for _name in ('OMP_NUM_THREADS', 'MKL_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
     os.environ.setdefault(_name, '1')
