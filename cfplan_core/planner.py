@@ -168,13 +168,15 @@ class _Planning:
                     self.roadmap = on_sheets
                     legs = self._search_goals(start, goals)
         except BudgetExhaustedError as stop:
-            message = f'{stop}; {verdicts.explored(self.roadmap)}'
+            message = f'{stop}{verdicts.constrained(self.options)}; '
+            message += verdicts.explored(self.roadmap)
             if isinstance(self.search, SampledSearch):
                 message += verdicts.sampled(self.options, self.search)
             return self._answer(Status.BUDGET_EXHAUSTED, message)
         if legs is None:
             nearest = goals[-1].how_near() if isinstance(goals[-1], GoalTest) else ''
-            message = f'no path{nearest}; {verdicts.explored(self.roadmap)}'
+            message = f'no path{verdicts.constrained(self.options)}{nearest}; '
+            message += verdicts.explored(self.roadmap)
             message += verdicts.doubt(self.roadmap)
             if self.moving.joint_count > MOST_JOINTS:
                 message += '. Rays do not show that there is no plan'
