@@ -353,7 +353,7 @@ class _Planning:
                 return None
         try:
             mesh = self._mesh(start, goal)
-            best = mesh.choose(prefer, first, self._refuse)
+            best = mesh.choose(prefer, first, self._refuse_one_by_one)
             if best is None:
                 return None
         except BudgetExhaustedError as stop:
@@ -391,6 +391,15 @@ class _Planning:
         refused |= straying_legs(self.system, whole, self.roadmap.constraints.bounds)
         self.roadmap.failures.update(refused.values())
         return list(refused)
+
+    def _refuse_one_by_one(self, legs: Sequence[Leg]) -> list[int]:
+        """As `_refuse`, of so many legs that the budget may end meanwhile."""
+        refused = []
+        for index, leg in enumerate(legs):
+            self._checkpoint()
+            if self._refuse([leg]):
+                refused.append(index)
+        return refused
 
     def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> Sequence[Leg] | None:
         """Search until a path is found that the joints' efforts can hold.
@@ -433,7 +442,7 @@ class _Planning:
         if count > MOST_JOINTS or along_rays:
             return None
         mesh = self._mesh(start, goal)
-        best = mesh.choose(Preference.FEWEST_SEGMENTS, None, self._refuse)
+        best = mesh.choose(Preference.FEWEST_SEGMENTS, None, self._refuse_one_by_one)
         if best is None:
             return None
         self.search = PathTrees(self.roadmap, best.legs)
