@@ -140,7 +140,7 @@ def _connected(
 ) -> Iterator[Any]:
     """Connect to a scheduler, or start one on this machine, with workers."""
     if scheduler is None:
-        _start_fork_server()
+        start_fork_server()
     distributed = import_distributed()
     # What becomes of workers is in the log of the study.
     for name in ('distributed', 'distributed.client'):
@@ -159,10 +159,10 @@ def _connected(
         yield client
 
 
-def _start_fork_server() -> None:
-    """Start the process that workers are forked from; it imports while this one does.
+def start_fork_server() -> None:
+    """Start the process that workers of this machine are forked from, unless there is one.
 
-    One that the program has started before stays as it is.
+    It imports what they need: whoever has something to do before `run_study` calls this first.
     """
     context = multiprocessing.get_context('forkserver')
     context.set_forkserver_preload(['cfplan_core.study.worker_imports'])
