@@ -9,7 +9,7 @@ import numpy as np
 
 from cfplan_core.contact.system import BoolArray, ContactSystem
 from cfplan_core.errors import CfplanError
-from cfplan_core.execution.feedforward import planned_torques
+from cfplan_core.execution.feedforward import FeedForward, planned_torques
 from cfplan_core.execution.outcome import Outcome, Tolerance, assess
 from cfplan_core.execution.perturbation import Uncertainty, World, draw
 from cfplan_core.execution.reference import Reference, build_reference
@@ -23,6 +23,9 @@ from cfplan_core.trajectory.torque_profile import POSITION
 # 0.1 kg and 6 cm about 20 N·m/rad.
 _STIFFNESS = 330.0
 _DAMPING_RATIO = 1.0
+# Of joints in torque control, in stiffnesses: enough to keep a finger that has lost its contact
+# from running away.
+_COMPLIANCE = 0.03
 _REST = 0.5
 _EXACT = Tolerance(1e-3, 0.02)
 _DISTURBED = Tolerance(2e-3, 0.05)
@@ -37,8 +40,8 @@ class ExecutionOptions:
         seed: Of the errors that are drawn.
         gain: Stiffness of joints held in position, N·m/rad; None for one that fits the object's
             weight and size.
-        roles: True to give the joints that the plan controls in torque their torque alone; False
-            to hold all joints in position, with the plan's torques fed forward.
+        roles: True to control joints in position or in torque as the plan says; False to hold all
+            of them in position. The plan's torques are fed forward either way.
         time_step: Of the engine, s.
         sampling: Time between measurements, s.
     """
@@ -46,7 +49,7 @@ class ExecutionOptions:
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
     seed: int = 0
     gain: float | None = None
-    roles: bool = False
+    roles: bool = True
     time_step: float = 5e-4
     sampling: float = 5e-3
 
@@ -103,12 +106,19 @@ class Executor:
         problem: What was planned.
         result: Its plan.
         options: How.
+        torques: Gives the torques that are fed forward at the frames of each segment, N·m.
 
     Raises:
         CfplanError: There is no plan, or it is not the problem's.
     """
 
-    def __init__(self, problem: Problem, result: PlanResult, options: ExecutionOptions) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        result: PlanResult,
+        options: ExecutionOptions,
+        torques: FeedForward = planned_torques,
+    ) -> None:
         if not result.solved:
             raise CfplanError(
                 f'only a solved plan can be executed, status is {result.status.value}'
@@ -128,11 +138,15 @@ class Executor:
         stiffness = options.gain if options.gain is not None else _STIFFNESS * unit
         inertia = problem.object.mass * self.system.size**2
         damping = 2.0 * _DAMPING_RATIO * np.sqrt(stiffness * inertia)
-        self.gains = Gains(np.full(joints, stiffness), np.zeros(joints), np.full(joints, damping))
+        self.gains = Gains(
+            np.full(joints, stiffness),
+            np.full(joints, _COMPLIANCE * stiffness),
+            np.full(joints, damping),
+        )
         self.reference = build_reference(
             self.system,
             result,
-            planned_torques(self.system, result),
+            torques(self.system, result),
             self._stiff(),
             options.time_step,
             _REST,
@@ -144,7 +158,10 @@ class Executor:
         if not self.options.roles:
             return np.ones((len(segments), len(names)), dtype=bool)
         if any(segment.control is None for segment in segments):
-            raise CfplanError('roles: the plan does not say how its joints are to be controlled')
+            raise CfplanError(
+                'roles: the plan does not say which joints are controlled in position and which '
+                'in torque; --no-roles holds all of them in position'
+            )
         return np.array(
             [[(s.control or {})[name] == POSITION for name in names] for s in segments]
         )

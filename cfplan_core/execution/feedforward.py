@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from cfplan_core.contact.elements import parse_contact
@@ -10,6 +12,9 @@ from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_forces import configurations, least_forces
 from cfplan_core.trajectory.plan_result import PlanResult, Segment
+
+FeedForward = Callable[[ContactSystem, PlanResult], tuple[FloatArray, ...]]
+"""Takes a plan's system and the plan to torques for each segment, of shape (f, n), N·m."""
 
 
 def segment_gradients(

@@ -2,12 +2,12 @@
 
 The model is planar: its object slides along x and y and turns about z, its links turn about z.
 Contact is possible exactly where the planner considers it, between a vertex of one body and the
-edges of another. Bodies are polygons whose corners are rounded, by a radius so small that a corner
-moves by a few ten thousandths of the object's size; edges stay where they are. The body's outline
-shrunk by the radius is collided with balls of twice the radius at the shrunk outline's vertices of
-the other: so a contact of the engine is one elemental contact, and as nothing ever overlaps, its
-direction is right also where a vertex passes a vertex. Exact corners would have to overlap there,
-and the engine would push them out through either edge.
+edges of another. Bodies are polygons whose corners are rounded, by radii so small that no corner
+moves by more than a few ten thousandths of the object's size; edges stay where they are. A body's
+outline shrunk by a distance is collided with balls at the corners of the other, whose radii are
+larger than these corners' by that distance: so a contact of the engine is one elemental contact,
+and as nothing ever overlaps, its direction is right also where a vertex passes a vertex. Exact
+corners would have to overlap there, and the engine would push them out through either edge.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 
 from cfplan_core.contact.system import ContactSystem, IntArray
 from cfplan_core.errors import CfplanError
-from cfplan_core.geometry.convex_pieces import convex_pieces, shrunk
+from cfplan_core.geometry.convex_pieces import convex_pieces, rounded, shrunk
 from cfplan_core.geometry.polygon import FloatArray, centroid, second_moment
 from cfplan_core.model import Problem
 
@@ -205,18 +205,18 @@ class _Builder:
         number = len(self.pieces)
         first = int(self.system.first_vertex[number])
         names = []
-        inner = shrunk(vertices, self.radius)
-        for k, piece in enumerate(convex_pieces(inner)):
+        for k, piece in enumerate(convex_pieces(shrunk(vertices, self.radius))):
             name = f'body {number} {k}'
             self._add_piece(body, name, piece)
             names.append(name)
         self.pieces.append(names)
+        centers, radii = rounded(vertices, self.radius)
         for k in np.flatnonzero(self.system.convex[first : first + len(vertices)]).tolist():
             body.add_geom(
                 name=f'vertex {first + k}',
                 type=self.mujoco.mjtGeom.mjGEOM_SPHERE,
-                size=[2.0 * self.radius, 0.0, 0.0],
-                pos=[*inner[k], 0.0],
+                size=[radii[k] + self.radius, 0.0, 0.0],
+                pos=[*centers[k], 0.0],
                 contype=0,
                 conaffinity=0,
             )

@@ -18,12 +18,38 @@ def shrunk(vertices: FloatArray, distance: float) -> FloatArray:
     Returns:
         Shape (v, 2): vertex k is where the moved edges k - 1 and k meet.
     """
+    return np.asarray(vertices + distance * _inward(vertices))
+
+
+def rounded(vertices: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+    """Round the corners of a polygon, sharp ones by less.
+
+    No corner moves farther than a right angle does that is rounded by the radius, (√2 − 1) times
+    it.
+
+    Args:
+        vertices: As of `shrunk`.
+        radius: m.
+
+    Returns:
+        Centres of the circles that touch both edges of each corner, shape (v, 2), and their radii,
+        shape (v,).
+    """
+    inward = _inward(vertices)
+    recedes = np.hypot(inward[:, 0], inward[:, 1]) - 1.0
+    right = np.sqrt(2.0) - 1.0
+    radii = radius * right / np.maximum(recedes, right)
+    return vertices + radii[:, None] * inward, radii
+
+
+def _inward(vertices: FloatArray) -> FloatArray:
+    """How corners move if all edges move inward by a unit, shape (v, 2)."""
     along = np.roll(vertices, -1, axis=0) - vertices
     along = along / np.hypot(along[:, 0], along[:, 1])[:, None]
     after = np.stack([along[:, 1], -along[:, 0]], axis=1)
     before = np.roll(after, 1, axis=0)
     together = 1.0 + (before * after).sum(axis=1, keepdims=True)
-    return np.asarray(vertices - distance * (before + after) / together)
+    return np.asarray(-(before + after) / together)
 
 
 def convex_pieces(vertices: FloatArray) -> tuple[FloatArray, ...]:

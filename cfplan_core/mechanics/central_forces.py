@@ -96,18 +96,26 @@ def _on_a_line(
     rate = np.einsum('sk,skn->sn', along, arms)
     slopes = np.concatenate([along, rate, -rate], axis=1)
     rooms = np.concatenate([base, torque - limits[0], limits[1] - torque], axis=1)
-    low, high = _interval(slopes, rooms)
+    low, high = interval(slopes, rooms)
     crossed = low > high
     both = np.isfinite(low) & np.isfinite(high)
     middle = np.where(both | crossed, 0.5 * (low + high), np.where(np.isinf(low), low, high))
     middle[np.isinf(low) & np.isinf(high)] = 0.0
     low[crossed] = high[crossed] = middle[crossed]
-    capped = np.clip(middle, *_interval(-along, cap[:, None] - base))
+    capped = np.clip(middle, *interval(-along, cap[:, None] - base))
     return np.asarray(base + np.clip(capped, low, high)[:, None] * along)
 
 
-def _interval(slopes: FloatArray, rooms: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The t with slope·t + room ≥ 0 for all columns: its ends, each of shape (s,)."""
+def interval(slopes: FloatArray, rooms: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Find the t with slope·t + room ≥ 0 for all m columns.
+
+    Args:
+        slopes: Shape (s, m).
+        rooms: Shape (s, m).
+
+    Returns:
+        Its ends, each of shape (s,); the lower one is above the upper one if there is none.
+    """
     zero = -np.divide(rooms, slopes, where=np.abs(slopes) > _FLAT, out=np.zeros_like(rooms))
     low = np.where(slopes > _FLAT, zero, -np.inf).max(axis=1)
     high = np.where(slopes < -_FLAT, zero, np.inf).min(axis=1)

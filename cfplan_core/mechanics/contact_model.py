@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple, Protocol
 
+from cfplan_core.contact.disturbance import Disturbance
 from cfplan_core.contact.system import BoolArray
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.mechanics.control_roles import Roles
 
 
 class Stability(str, Enum):
@@ -64,26 +64,31 @@ class Holding(NamedTuple):
 
     Attributes:
         gradients: Shape (s, k, 3 + n).
+        disturbance: What errors do to these.
         lower: Shape (s, n), smallest torques that are possible, without the links' weight.
         upper: Shape (s, n), largest ones.
     """
 
     gradients: FloatArray
+    disturbance: Disturbance
     lower: FloatArray
     upper: FloatArray
 
 
 class Actuation(NamedTuple):
-    """How actuators hold the object along a stretch.
+    """A way in which actuators can hold the object along a stretch.
 
     Attributes:
-        torques: Shape (s, n), in the middle of those that keep all contacts, without the links'
-            weight.
-        roles: Which joints to control in torque, the best choice first.
+        effort: Indices of the joints to be controlled in torque, in order; the others are held in
+            position.
+        torques: Shape (s, n), without the links' weight.
+        margin: By which errors tell when a contact is lost, in units of the model: to compare
+            ways to hold the same stretch.
     """
 
+    effort: tuple[int, ...]
     torques: FloatArray
-    roles: tuple[Roles, ...]
+    margin: float
 
 
 class ContactModel(Protocol):
@@ -124,10 +129,13 @@ class ContactModel(Protocol):
         Unlike `torque_limits` this asks for all joints at once.
         """
 
-    def actuation(self, stretches: Sequence[Holding], squeeze: float) -> tuple[Actuation, ...]:
-        """Say how actuators should hold stretches of motion, each inside one contact formation.
+    def actuations(
+        self, stretches: Sequence[Holding], squeeze: float
+    ) -> tuple[tuple[Actuation, ...], ...]:
+        """Say how actuators can hold stretches of motion, each inside one contact formation.
 
-        With contact forces of at most `squeeze` weights where the contacts leave a choice.
+        With contact forces of at most `squeeze` weights where the contacts leave a choice. For
+        each stretch at least one way, the best first.
         """
 
     def needed_forces(self, gradients: FloatArray) -> FloatArray:

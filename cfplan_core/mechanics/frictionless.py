@@ -16,10 +16,9 @@ import numpy as np
 from cfplan_core.contact.system import BoolArray, IntArray
 from cfplan_core.errors import JammedError
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.mechanics.central_forces import central_forces
+from cfplan_core.mechanics.actuation import actuations
 from cfplan_core.mechanics.closure import span_margin, span_margins
 from cfplan_core.mechanics.contact_model import Actuation, Holding, Margins, Motion
-from cfplan_core.mechanics.control_roles import control_roles
 from cfplan_core.mechanics.needed_force import needed_forces
 from cfplan_core.mechanics.second_order import pair_forces, second_order_margin
 
@@ -123,26 +122,11 @@ class FrictionlessModel:
             holds[index] = found.status == 0
         return holds
 
-    def actuation(self, stretches: Sequence[Holding], squeeze: float) -> tuple[Actuation, ...]:
-        """Take the Chebyshev centre of all equilibria, see `central_forces`, and its roles."""
-        held: dict[int, Actuation] = {}
-        for count in {stretch.gradients.shape[1] for stretch in stretches}:
-            alike = [
-                k for k, stretch in enumerate(stretches) if stretch.gradients.shape[1] == count
-            ]
-            # Calls cost more than what they compute.
-            gradients, lower, upper = (
-                np.concatenate(parts) for parts in zip(*[stretches[k] for k in alike], strict=True)
-            )
-            w, arms = gradients[..., :3], -gradients[..., 3:]
-            forces = central_forces(w, arms, self.load, (lower, upper), squeeze)
-            torques = np.einsum('sk,skn->sn', forces, arms)
-            ends = np.cumsum([len(stretches[k].gradients) for k in alike])
-            for k, end in zip(alike, ends.tolist(), strict=True):
-                rows = slice(end - len(stretches[k].gradients), end)
-                roles = control_roles(w[rows], arms[rows], forces[rows])
-                held[k] = Actuation(np.asarray(torques[rows]), roles)
-        return tuple(held[k] for k in range(len(stretches)))
+    def actuations(
+        self, stretches: Sequence[Holding], squeeze: float
+    ) -> tuple[tuple[Actuation, ...], ...]:
+        """Find the most tolerant torques of four contacts, else the middle of all equilibria."""
+        return actuations(stretches, self.load, squeeze)
 
     def needed_forces(self, gradients: FloatArray) -> FloatArray:
         """Smallest possible largest contact force, in weights, of each configuration."""

@@ -77,7 +77,7 @@ _ALL = (
     Parameter('geometry-error', 0.0, 'of vertices, in sizes of the object'),
     Parameter('joint-noise', 0.0, "of each joint's zero, degrees"),
     Parameter('gain', None, 'stiffness of joints held in position, N·m/rad'),
-    Parameter('roles', NO, 'whether joints are controlled as the plan says', choices=(NO, YES)),
+    Parameter('roles', YES, 'whether joints are controlled as the plan says', choices=(NO, YES)),
 )
 
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType({entry.name: entry for entry in _ALL})

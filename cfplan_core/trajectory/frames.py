@@ -127,7 +127,7 @@ def build_frames(
             needed = float(model.needed_forces(gradients).max())
             last = first + len(z) - 1
             segments.append(Segment(contacts, stability.value, first, last, needed))
-            profile.add(gradients, z, low, high)
+            profile.add(leg.formation, z, gradients, (low, high))
             entry_lower.append(low[0])
             entry_upper.append(high[0])
             shared = 1 if points else 0

@@ -1,14 +1,15 @@
-"""Nominal torques along a plan: the middle of each segment's equilibria, joined at the events.
+"""Nominal torques along a plan: those that suit each segment best, joined at the events.
 
 Where two segments meet the contacts of both touch. Their equilibria are faces of one polytope,
 that of all these contacts, and often have no more than a vertex in common: a torque that stayed
 inside the limits of one segment and then of the other would have to pass that very point (Trinkle
-& Hunter, Figure 7, times 20 and 68). On the straight way from the middle τ_A of the one to the
-middle τ_B of the other all contacts press, so at the event the nominal torque is τ_A +
+& Hunter, Figure 7, times 20 and 68). On the straight way from the torque τ_A of the one to the
+torque τ_B of the other all contacts press, so at the event the nominal torque is τ_A +
 λ (τ_B − τ_A): squeezed or relaxed towards the next segment as far as the limits of the first one
 leave room, and no farther than the middle of what the limits of both allow.
 
-Which joints are controlled in torque, `cfplan_core.mechanics.control_roles` tells.
+What suits a segment, and which joints are controlled in torque, `cfplan_core.mechanics.actuation`
+tells.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cfplan_core.contact.disturbance import disturbance
+from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_model import Actuation, ContactModel, Holding
-from cfplan_core.mechanics.control_roles import Roles
 
 Limits = tuple[FloatArray, FloatArray]
 
@@ -57,7 +59,7 @@ class TorqueProfile:
 
         Args:
             system: Compiled problem, with all joints.
-            model: Gives the middle of the equilibria.
+            model: Says how segments can be held.
             squeeze: Largest contact force, weights.
         """
         self._system = system
@@ -70,62 +72,64 @@ class TorqueProfile:
         self._weights: list[FloatArray] = []
         self._limits: list[Limits] = []
 
-    def add(self, gradients: FloatArray, z: FloatArray, low: FloatArray, high: FloatArray) -> None:
+    def add(
+        self, formation: Formation, z: FloatArray, gradients: FloatArray, limits: Limits
+    ) -> None:
         """Append a segment.
 
         Args:
-            gradients: Shape (s, k, 3 + n), of its contacts.
+            formation: Its contacts.
             z: Shape (s, 3 + n).
-            low: Shape (s, n), torque limits with the links' weight, N·m.
-            high: As `low`.
+            gradients: Shape (s, k, 3 + n), of the contacts' gaps.
+            limits: Lower and upper torques with the links' weight, each of shape (s, n), N·m.
         """
         weight = self._system.link_weight_torques(z)
         effort = self._effort / self._unit
-        self._stretches.append(Holding(gradients, -effort - weight, effort - weight))
+        errors = disturbance(self._system, z, formation.array)
+        self._stretches.append(Holding(gradients, errors, -effort - weight, effort - weight))
         self._weights.append(weight)
-        self._limits.append((low, high))
+        self._limits.append(limits)
 
     def joined(self) -> Profile:
-        """Find the middles of the segments and join them at the frames that they share."""
-        actuations = self._model.actuation(self._stretches, self._squeeze)
+        """Choose how to hold each segment; join their torques at the frames that they share."""
+        chosen = _chosen(self._model.actuations(self._stretches, self._squeeze))
         own, within = [], []
-        for actuation, weight, (low, high) in zip(
-            actuations, self._weights, self._limits, strict=True
-        ):
-            middle = (actuation.torques + weight) * self._unit
-            # The middle of an interval of no width may be beside it by rounding.
-            own.append(np.fmin(np.fmax(middle, low), high))
+        for way, weight, (low, high) in zip(chosen, self._weights, self._limits, strict=True):
+            torques = (way.torques + weight) * self._unit
+            # A torque from an interval of no width may be beside it by rounding.
+            own.append(np.fmin(np.fmax(torques, low), high))
             within.append((np.fmax(low, -self._effort), np.fmin(high, self._effort)))
-        middles = [middle.copy() for middle in own]
-        for k in range(len(middles) - 1):
+        joined = [torques.copy() for torques in own]
+        for k in range(len(joined) - 1):
             before, after = own[k][-1], own[k + 1][0]
             leaves = within[k][0][-1], within[k][1][-1]
             enters = within[k + 1][0][0], within[k + 1][1][0]
-            middles[k][-1] = _towards(before, after, leaves, enters)
-            middles[k + 1][0] = _towards(after, before, enters, leaves)
-        entries = np.array([middle[0] for middle in middles])
-        rows = [middle[1 if k else 0 :] for k, middle in enumerate(middles)]
-        return Profile(np.concatenate(rows), entries, self._controls(actuations))
+            joined[k][-1] = _towards(before, after, leaves, enters)
+            joined[k + 1][0] = _towards(after, before, enters, leaves)
+        entries = np.array([torques[0] for torques in joined])
+        rows = [torques[1 if k else 0 :] for k, torques in enumerate(joined)]
+        return Profile(np.concatenate(rows), entries, self._controls(chosen))
 
-    def _controls(self, actuations: Sequence[Actuation]) -> tuple[dict[str, str], ...]:
+    def _controls(self, chosen: Sequence[Actuation]) -> tuple[dict[str, str], ...]:
         """How to control each joint in each segment."""
         names = self._system.problem.hand.joint_names
-        chosen: tuple[int, ...] = ()
-        controls = []
-        for actuation in actuations:
-            chosen = _roles(actuation.roles, chosen)
-            effort = {names[joint] for joint in chosen}
-            controls.append({name: EFFORT if name in effort else POSITION for name in names})
-        return tuple(controls)
+        return tuple(
+            {name: EFFORT if j in way.effort else POSITION for j, name in enumerate(names)}
+            for way in chosen
+        )
 
 
-def _roles(roles: Sequence[Roles], before: tuple[int, ...]) -> tuple[int, ...]:
-    """The best roles, or those of the segment before if they are nearly as good."""
-    best = roles[0]
-    for choice in roles:
-        if choice.effort == before and choice.margin >= _KEPT * best.margin:
-            return choice.effort
-    return best.effort
+def _chosen(ways: Sequence[Sequence[Actuation]]) -> list[Actuation]:
+    """The best way for each segment, or that with the roles before if it is nearly as good."""
+    chosen: list[Actuation] = []
+    for choices in ways:
+        best = choices[0]
+        for way in choices:
+            same = bool(chosen) and way.effort == chosen[-1].effort
+            if same and way.margin >= _KEPT * best.margin:
+                best = way
+        chosen.append(best)
+    return chosen
 
 
 def _towards(start: FloatArray, end: FloatArray, own: Limits, other: Limits) -> FloatArray:

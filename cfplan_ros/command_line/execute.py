@@ -79,10 +79,11 @@ MISSED = 1
     "object's weight and size.",
 )
 @click.option(
-    '--roles',
-    is_flag=True,
-    help='Give joints that the plan controls in torque their torque alone; without it all joints '
-    "are held in position, with the plan's torques fed forward.",
+    '--roles/--no-roles',
+    default=True,
+    show_default=True,
+    help='Control joints in position or in torque as the plan says, or hold all of them in '
+    "position; the plan's torques are fed forward either way.",
 )
 @click.option(
     '--trials',

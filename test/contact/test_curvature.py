@@ -1,15 +1,19 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from random_problems import random_problem
 
-from cfplan_core.contact.curvature import wrench_rates
+from cfplan_core import load_problem
+from cfplan_core.contact.curvature import gap_hessians, wrench_rates
 from cfplan_core.contact.gaps import gap_gradients
 from cfplan_core.contact.held import HeldSystem
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 
+PROBLEMS = Path(__file__).parents[2] / 'config' / 'problems'
 STEP = 1e-6
 
 
@@ -56,3 +60,26 @@ def test_held_joints_have_no_rates() -> None:
     all_rates = wrench_rates(whole, whole.place(z[None]), pairs)
     rates = wrench_rates(held, held.place(held.reduced(z)[None]), pairs)
     np.testing.assert_allclose(rates, np.delete(all_rates, 3, axis=-1), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    'name', ['trinkle_hunter_1991', 'many_joints/two_fingers_three_joints', 'h205']
+)
+def test_hessians_of_all_gaps_are_those_of_finite_differences(name: str) -> None:
+    problem = load_problem(PROBLEMS / f'{name}.yaml')
+    system = ContactSystem(problem)
+    z = system.configuration(problem.start) + 0.05 * np.random.default_rng(1).normal(
+        size=system.dof
+    )
+    pairs = np.arange(system.contact_count)
+
+    def gradients(at: FloatArray) -> FloatArray:
+        return gap_gradients(system, system.place(at[None]), pairs)[0]
+
+    expected = np.stack(
+        [(gradients(z + e) - gradients(z - e)) / (2.0 * STEP) for e in STEP * np.eye(system.dof)],
+        axis=-1,
+    )
+    found = gap_hessians(system, system.place(z[None]), pairs)[0]
+    np.testing.assert_allclose(found, expected, atol=1e-8)
+    np.testing.assert_allclose(found, found.swapaxes(-1, -2), atol=1e-12)

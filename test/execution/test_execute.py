@@ -93,17 +93,25 @@ def test_stiffer_joints_follow_more_closely(execute: Run) -> None:
     assert error(stiff) < 0.5 * error(soft)
 
 
-def test_joint_in_torque_is_given_its_torque_alone(planned: PlanResult, execute: Run) -> None:
-    run = execute(roles=True)
-    assert run.outcome.in_goal
-    held = np.array([s.control['right_joint'] == 'position' for s in planned.segments])
-    inside = ~held[run.reference.segments[run.run.rows]]
-    assert inside.any()
-    supplied = run.run.torques[inside, 1] - run.reference.torques[run.run.rows][inside, 1]
-    still = np.abs(
-        run.run.joint_velocities[inside, 1] - run.reference.velocities[run.run.rows][inside, 1]
-    )
-    assert np.abs(supplied[still < 1e-3]).max() < 5e-3
+def test_joint_in_torque_is_given_its_torque_and_little_more(
+    planned: PlanResult, execution: Execution
+) -> None:
+    """By its compliance, less than a thirtieth of 20 N·m/rad, whatever its error."""
+    run, reference = execution.run, execution.reference
+    stiff = reference.stiff[run.rows]
+    assert stiff.any()
+    assert not stiff.all()
+    for joint in range(2):
+        moves = np.abs(run.joint_velocities - reference.velocities[run.rows])[:, joint] > 1e-4
+        still = ~stiff[:, joint] & ~moves
+        assert still.sum() > 20
+        supplied = run.torques[still, joint] - reference.torques[run.rows][still, joint]
+        error = reference.joints[run.rows][still, joint] - run.joints[still, joint]
+        assert (np.abs(supplied) <= 0.7 * np.abs(error) + 1e-4).all()
+
+
+def test_without_roles_all_joints_are_held_in_position(execute: Run) -> None:
+    assert execute(roles=False).reference.stiff.all()
 
 
 def test_torque_fed_forward_makes_up_for_softness(problem: Problem, planned: PlanResult) -> None:
@@ -141,8 +149,8 @@ def test_plan_of_another_problem_is_refused(problem: Problem, planned: PlanResul
 
 def test_roles_of_a_plan_without_are_refused(problem: Problem, planned: PlanResult) -> None:
     segments = tuple(replace(segment, control=None) for segment in planned.segments)
-    with pytest.raises(CfplanError, match='does not say how its joints are to be controlled'):
-        execute_plan(problem, replace(planned, segments=segments), ExecutionOptions(roles=True))
+    with pytest.raises(CfplanError, match=r'does not say which joints .*; --no-roles'):
+        execute_plan(problem, replace(planned, segments=segments))
 
 
 def test_missing_engine_is_named_with_what_to_do(

@@ -47,3 +47,6 @@ def test_panels_show_planned_and_measured_pose_and_torque(
         lines = {line.get_gid(): line for line in axes.lines}
         assert np.array_equal(lines[EXECUTED].get_ydata(), values)
         assert np.array_equal(lines[PLANNED].get_ydata(), asked[run.rows])
+        low, high = axes.get_ylim()
+        assert low < asked.min() <= asked.max() < high
+        assert np.mean((low < values) & (values < high)) > 0.97

@@ -74,7 +74,7 @@ def test_every_parameter_sets_its_option() -> None:
     }
     execution = {
         **{'friction': 0.1, 'mass-error': 0.2, 'geometry-error': 0.01, 'joint-noise': 0.5},
-        **{'gain': 10.0, 'roles': 'yes'},
+        **{'gain': 10.0, 'roles': 'no'},
     }
     assert {*plan, *execution} == set(PARAMETERS)
     trajectory = TrajectoryOptions(2.0, 0.1, 0.2, 0.5)
@@ -87,5 +87,5 @@ def test_every_parameter_sets_its_option() -> None:
         trajectory=trajectory,
     )
     uncertainty = Uncertainty(0.1, 0.2, 0.01, math.radians(0.5))
-    expected = ExecutionOptions(uncertainty, 7, 10.0, True)
+    expected = ExecutionOptions(uncertainty, 7, 10.0, False)
     assert execution_options({**DEFAULTS, **execution}, 7) == expected

@@ -7,15 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from planning.scenes import HALF, LEFT, at, pushed_angles, pushed_block
+from planning.scenes import pushed_block
 
 from cfplan_core import PlanOptions, PlanResult, Problem, load_problem, plan
-from cfplan_core.contact.detection import touching
-from cfplan_core.contact.gaps import gap_gradients
+from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.errors import CfplanError
 from cfplan_core.mechanics.contact_model import Actuation, Holding
-from cfplan_core.mechanics.control_roles import Roles
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.options import TrajectoryOptions
 from cfplan_core.trajectory.torque_profile import TorqueProfile
@@ -40,34 +38,6 @@ def test_every_nominal_torque_is_inside_its_limits(name: str) -> None:
     assert ((entry >= result.entry_lower) & (entry <= result.entry_upper)).all()
 
 
-@pytest.mark.parametrize('name', ['h120', 'trinkle_hunter_1991'])
-def test_nominal_torques_of_bounded_intervals_are_their_middles(name: str) -> None:
-    """With four contacts all torques are functions of one number, linear ones."""
-    _, result = planned(name, squeeze=100.0)
-    found = 0
-    for segment in result.segments:
-        rows = slice(segment.first_frame + 1, segment.last_frame)
-        lower, upper = result.torque_lower[rows], result.torque_upper[rows]
-        bounded = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
-        bounded &= np.abs(np.append(lower, upper, axis=1)).max(axis=1) < 2.0
-        middle = 0.5 * (lower + upper)[bounded]
-        nominal = result.torque_nominal[rows][bounded]
-        np.testing.assert_allclose(nominal, middle, rtol=1e-6, atol=1e-9)
-        found += len(middle)
-    assert found > 20
-
-
-def test_a_larger_squeeze_presses_harder_in_form_closure_alone() -> None:
-    soft, hard = planned('h447', 2.0)[1], planned('h447', 4.0)[1]
-    for segment in soft.segments:
-        rows = slice(segment.first_frame + 1, segment.last_frame)
-        torques = [np.abs(r.torque_nominal[rows]).max(axis=1, initial=0.0) for r in (soft, hard)]
-        if segment.stability == 'form_closure':
-            assert (torques[1] > 1.3 * torques[0]).all()
-        else:
-            assert (torques[1] >= torques[0] - 1e-9).all()
-
-
 def test_at_an_event_the_torques_are_inside_the_limits_of_both_segments_where_these_meet() -> None:
     met = 0
     for name in ('h013', 'h447', 'trinkle_hunter_1991'):
@@ -87,18 +57,21 @@ def profile_of(*segments: tuple[float, float, float]) -> tuple[np.ndarray, np.nd
     """A profile of segments of one joint, each with limits and a nominal torque all along."""
 
     class Given(FrictionlessModel):
-        def actuation(self, stretches: Sequence[Holding], squeeze: float) -> tuple[Actuation, ...]:
+        def actuations(
+            self, stretches: Sequence[Holding], squeeze: float
+        ) -> tuple[tuple[Actuation, ...], ...]:
             unit = system.force_unit * system.size
-            roles = (Roles((), np.inf),)
             return tuple(
-                Actuation(np.full((2, 2), nominal / unit), roles) for _, nominal, _ in segments
+                (Actuation((), np.full((2, 2), nominal / unit), np.inf),)
+                for _, nominal, _ in segments
             )
 
     system = ContactSystem(pushed_block())
     profile = TorqueProfile(system, Given(system.load), 5.0)
     for low, _, high in segments:
-        shape, z = (2, 2), np.zeros((2, system.dof))
-        profile.add(np.zeros((2, 4, 5)), z, np.full(shape, low), np.full(shape, high))
+        z = np.tile(system.configuration(system.problem.start), (2, 1))
+        limits = np.full((2, 2), low), np.full((2, 2), high)
+        profile.add(Formation((0, 1, 2, 3)), z, np.zeros((2, 4, 5)), limits)
     joined = profile.joined()
     return joined.torques[:, 0], joined.entries[:, 0]
 
@@ -118,24 +91,6 @@ def test_limits_that_do_not_meet_are_left_at_their_end() -> None:
 def test_equal_middles_are_not_changed() -> None:
     torques, _ = profile_of((0.0, 0.1, 0.2), (-0.2, 0.1, 0.4))
     np.testing.assert_allclose(torques, [0.1, 0.1, 0.1])
-
-
-def test_a_pushed_block_is_pressed_half_as_hard_as_it_can_bear() -> None:
-    """A block between fingers at heights a and b bears s = weight · half / |a − b|."""
-    problem = pushed_block()
-    system = ContactSystem(problem)
-    model = FrictionlessModel(system.load)
-    z = at(system, 0.002, pushed_angles(0.002))[None]
-    heights = np.sin(z[0, 3:]) * [LEFT, 0.045]
-    pairs = np.array(touching(system, z[0], 1e-6))
-    gradients = gap_gradients(system, system.place(z), pairs)
-    limit = np.full((1, 2), 99.0)
-    (held,) = model.actuation([Holding(gradients, -limit, limit)], 50.0)
-    torque = held.torques
-    force = 0.1 * 9.81 * HALF / abs(heights[0] - heights[1])
-    expected = 0.5 * force * heights * [-1.0, 1.0]
-    unit = system.force_unit * system.size
-    np.testing.assert_allclose(torque[0] * unit, expected, rtol=1e-9)
 
 
 def test_squeeze_must_be_above_zero() -> None:

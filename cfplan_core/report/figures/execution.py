@@ -16,6 +16,7 @@ from cfplan_core.report.style import INK, MUTED, OBJECT, SMALL_FONT_SIZE, joint_
 from cfplan_core.trajectory.plan_result import PlanResult
 
 PLANNED, EXECUTED = 'planned', 'executed'
+_USUAL = (1.0, 99.0)
 _POSE = (('x (mm)', 1e3), ('y (mm)', 1e3), ('angle (rad)', 1.0))
 
 
@@ -45,7 +46,9 @@ def execution_figure(problem: Problem, result: PlanResult, execution: Execution)
         axes = panels[len(_POSE) + k]
         lower, upper = result.torque_lower[:, k], result.torque_upper[:, k]
         planned = reference.torques[run.rows, k]
-        low, high = torque_view(np.append(lower, planned), np.append(upper, planned))
+        # Blows at contact events may stick out.
+        usual = np.percentile(run.torques[:, k], _USUAL)
+        low, high = torque_view(lower, upper, np.append(planned, usual))
         axes.set_ylim(low, high)
         ends = np.repeat(result.times, 2)[1:-1]
         bottom, top = (interval_limits(v, result.segments) for v in (lower, upper))
