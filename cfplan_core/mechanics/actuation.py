@@ -13,10 +13,9 @@ import numpy as np
 
 from cfplan_core.contact.disturbance import Disturbance
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.mechanics.central_forces import HEADROOM, central_forces
+from cfplan_core.mechanics.central_forces import central_forces, force_caps
 from cfplan_core.mechanics.contact_model import Actuation, Holding
 from cfplan_core.mechanics.control_roles import control_roles
-from cfplan_core.mechanics.needed_force import needed_forces
 from cfplan_core.mechanics.tolerant_torques import most_tolerant
 
 # So many joints, of those whose torque may be off by most, are compared in earnest.
@@ -90,7 +89,7 @@ def _tolerant(
 ) -> list[tuple[Actuation, ...]]:
     """Ways to hold four contacts as tolerantly as can be, or `held` where that is not at all."""
     arms = -together.gradients[..., 3:]
-    cap = np.maximum(squeeze, HEADROOM * needed_forces(together.gradients[..., :3], load))
+    cap = force_caps(together.gradients[..., :3], load, squeeze)
     wanted = [
         [way.effort[0] for way in ways[:_CANDIDATES] if len(way.effort) == 1] for ways in held
     ]
@@ -105,8 +104,8 @@ def _tolerant(
             # At the ends of a stretch contacts are made and lost.
             inside = tolerance[own][1:-1] if own.stop - own.start > 2 else tolerance[own]
             if joint in wanted[k]:
-                margin = float(inside.min())
-                found[k].append(Actuation((joint,), np.asarray(torques[own]), margin))
+                supplied = np.where(np.isnan(torques[own]), held[k][0].torques, torques[own])
+                found[k].append(Actuation((joint,), supplied, float(inside.min())))
     best = [sorted(ways, key=lambda way: -way.margin) for ways in found]
     return [
         tuple(ways) if ways and ways[0].margin > 0.0 else before

@@ -56,7 +56,7 @@ def central_forces(
     forces = np.zeros((samples, count))
     if not count:
         return forces
-    cap = np.maximum(squeeze, HEADROOM * needed_forces(wrenches, load))
+    cap = force_caps(wrenches, load, squeeze)
     left, values, right = np.linalg.svd(wrenches.transpose(0, 2, 1))
     regular = values > _RANK * values[:, :1]
     inverse = np.divide(1.0, values, where=regular, out=np.zeros_like(values))
@@ -78,6 +78,12 @@ def central_forces(
                 for k, null in zip(np.flatnonzero(rows), rest, strict=True)
             ]
     return np.maximum(forces, 0.0)
+
+
+def force_caps(wrenches: FloatArray, load: FloatArray, squeeze: float) -> FloatArray:
+    """Give the cap on the contact forces of each configuration, as in `central_forces`; (s,)."""
+    needed = needed_forces(wrenches, load)
+    return np.maximum(squeeze, HEADROOM * np.where(np.isfinite(needed), needed, 0.0))
 
 
 def _on_a_line(

@@ -44,7 +44,8 @@ class Tolerance(NamedTuple):
     """The torque of one joint that tolerates nearly the largest errors.
 
     Attributes:
-        forces: Shape (s, 4), contact forces in weights.
+        forces: Shape (s, 4), contact forces in weights; nan where the joint's torque does not
+            tell them, as at a contact on the joint's axis.
         tolerance: Shape (s,), errors that are tolerated, in typical errors; 0 where no torque
             keeps all contacts, or the joint's torque does not tell the forces.
     """
@@ -78,18 +79,20 @@ def most_tolerant(
     matrix[~regular] = np.eye(4)
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     base, slope = -inverse[:, :, :3] @ load, inverse[:, :, 3]
-    response = _responses(gradients, disturbance, joint, inverse)
-    steady = MASS * np.abs(base) + TORQUE * np.abs(slope)
-    lean = inverse @ _columns(disturbance.leaning, rows)
+    # Forces are linear in (1, τ), and so is what each error changes of them.
+    lines = np.stack([base, slope], axis=-1)
+    constant, growing = _changes(gradients, disturbance, joint, inverse, lines)
+    # Not zero where a contact never presses.
+    steady = MASS * np.abs(base) + TORQUE * np.abs(slope) + _SINGULAR
+    lean = inverse @ (_columns(disturbance.leaning, rows) @ lines)
 
     def forces(torque: FloatArray) -> FloatArray:
         return np.asarray(base + torque[:, None] * slope)
 
     def tolerance(torque: FloatArray) -> FloatArray:
-        c = forces(torque)
-        error = np.abs(response @ c[:, None, :, None])[..., 0].sum(axis=1) + steady
-        error += np.maximum((lean @ c[:, :, None])[..., 0], 0.0)
-        return np.asarray((c / error).min(axis=1))
+        error = np.abs(constant + torque[:, None] * growing).sum(axis=0) + steady
+        error += np.maximum(lean[..., 0] + torque[:, None] * lean[..., 1], 0.0)
+        return np.asarray((forces(torque) / error).min(axis=1))
 
     low, high = _bounds(base, slope, -gradients[..., 3:], limits, cap)
     most = _highest(tolerance, low, high)
@@ -100,7 +103,7 @@ def most_tolerant(
         tolerates = tolerance(between) >= enough
         most, gentle = np.where(tolerates, between, most), np.where(tolerates, gentle, between)
     found = np.where(regular, tolerance(most).clip(0.0), 0.0)
-    return Tolerance(forces(most), found)
+    return Tolerance(np.where(regular[:, None], forces(most), np.nan), found)
 
 
 def _columns(gradients: FloatArray, rows: list[int]) -> FloatArray:
@@ -110,10 +113,14 @@ def _columns(gradients: FloatArray, rows: list[int]) -> FloatArray:
     return columns
 
 
-def _responses(
-    gradients: FloatArray, disturbance: Disturbance, joint: int, inverse: FloatArray
-) -> FloatArray:
-    """Changes of the forces by each error, as matrices to be applied to these, (s, u, 4, 4)."""
+def _changes(
+    gradients: FloatArray,
+    disturbance: Disturbance,
+    joint: int,
+    inverse: FloatArray,
+    lines: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """What each of u errors changes of the forces lines · (1, τ): of either part, (u, s, 4)."""
     samples, count, dof = gradients.shape
     free = [0, 1, 2, 3 + joint]
     held = [d for d in range(3, dof) if d != 3 + joint]
@@ -131,7 +138,9 @@ def _responses(
         motion[:, number, d] = JOINT
     change = np.einsum('skda,sua->sukd', disturbance.hessians, motion)
     sources[:, 2 * count :] = _columns(change, free)
-    return np.asarray(inverse[:, None] @ sources)
+    changes = inverse[:, None] @ (sources @ lines[:, None])
+    constant, growing = np.ascontiguousarray(changes.transpose(3, 1, 0, 2))
+    return constant, growing
 
 
 def _bounds(

@@ -146,8 +146,9 @@ class PlanResult:
     def reversed(self) -> PlanResult:
         """Return the plan from the goal to the start.
 
-        Each segment's contacts, torque limits and speed are as before, in reverse order; the name
-        stays that of the problem, whose start and goal have changed places.
+        Each segment's contacts, torques, control and speed are as before, in reverse order; the
+        name stays that of the problem, whose start and goal have changed places. Nominal torques
+        were chosen with room for friction against the motion as planned, not against this one.
 
         Raises:
             CfplanError: It is not solved, or not known to be reversible: its contact model is

@@ -61,6 +61,26 @@ def test_a_foot_farther_along_the_palm_has_another_moment() -> None:
     np.testing.assert_allclose((found - before) / STEP, -by_unit, atol=1e-6)
 
 
+def test_a_tip_farther_along_an_edge_has_another_lever() -> None:
+    problem, system, z, pairs = block()
+    placed = system.place(z)
+    edge = system.pair_edge[pairs[2]]
+    along = 1j * placed.normals[1, edge] * np.exp(-1j * z[1, 3])
+
+    def gradient(step: float) -> FloatArray:
+        left, right = problem.hand.fingers
+        vertices = left.links[0].vertices.copy()
+        vertices[1] += step * problem.object.size * np.array([along.real, along.imag])
+        moved = replace(left, links=(replace(left.links[0], vertices=vertices),))
+        changed = replace(problem, hand=replace(problem.hand, fingers=(moved, right)))
+        other = ContactSystem(changed)
+        return np.asarray(gap_gradients(other, other.place(z[1:2]), pairs[2:3])[0, 0])
+
+    by_unit = disturbance(system, z, pairs).shifted[1, 2] / GEOMETRY
+    assert abs(by_unit[3]) > 0.5
+    np.testing.assert_allclose((gradient(STEP) - gradient(0.0)) / STEP, by_unit, atol=1e-6)
+
+
 def test_friction_at_the_feet_pulls_against_the_way_of_the_block() -> None:
     _, system, z, pairs = block()
     for way, sign in ((z, -1.0), (z[::-1], 1.0)):

@@ -105,6 +105,14 @@ def test_one_contact_under_the_centre_carries_the_weight() -> None:
     np.testing.assert_allclose(forces, [1.0])
 
 
+@pytest.mark.parametrize('count', [4, 5, 6])
+def test_feet_that_cannot_bear_a_load_from_the_side_bear_what_they_can(count: int) -> None:
+    feet = np.array([[[0.0, 1.0, place] for place in np.linspace(-0.5, 0.5, count)]])
+    load = np.array([0.6, -0.8, 0.0])
+    (forces,) = central_forces(feet, np.zeros((1, count, 2)), load, (-FREE, FREE), 5.0)
+    np.testing.assert_allclose(forces @ feet[0], [0.0, 0.8, 0.0], atol=1e-9)
+
+
 def test_a_squeeze_below_the_needed_force_gives_way() -> None:
     wrenches = block(0.3, 0.3)
     forces = middle(wrenches, levers(0.3, 0.3), squeeze=0.1)

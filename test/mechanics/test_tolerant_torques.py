@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import cache
 from pathlib import Path
 
@@ -10,7 +9,14 @@ import numpy as np
 import pytest
 
 from cfplan_core import PlanResult, Problem, load_problem, plan
-from cfplan_core.contact.disturbance import GEOMETRY, JOINT, MASS, disturbance
+from cfplan_core.contact.disturbance import (
+    GEOMETRY,
+    JOINT,
+    MASS,
+    TORQUE,
+    Disturbance,
+    disturbance,
+)
 from cfplan_core.contact.elements import parse_contact
 from cfplan_core.contact.gaps import gap_gradients, gaps
 from cfplan_core.contact.system import ContactSystem, IntArray
@@ -43,7 +49,7 @@ def middle(name: str, segment: int) -> tuple[ContactSystem, FloatArray, IntArray
 
 def tolerant(system: ContactSystem, z: FloatArray, pairs: IntArray, joint: int) -> Tolerance:
     gradients = gap_gradients(system, system.place(z), pairs)
-    limits = tuple(np.tile(limit, (len(z), 1)) for limit in NO_LIMITS)
+    limits = tuple(np.full((len(z), system.joint_count), limit) for limit in (-99.0, 99.0))
     errors = disturbance(system, z, pairs)
     cap = np.full(len(z), 50.0)
     found = most_tolerant(gradients, errors, joint, system.load, limits, cap)  # type: ignore[arg-type]
@@ -125,6 +131,49 @@ def test_other_torques_are_lost_more_often(name: str, segment: int) -> None:
     assert min(kept(0.1), kept(30.0)) < 0.8 * most
 
 
+@pytest.mark.parametrize(('name', 'segment'), PLACES)
+@pytest.mark.parametrize('joint', [0, 1])
+def test_tolerance_is_the_ratio_of_forces_to_the_sum_of_their_changes(
+    name: str, segment: int, joint: int
+) -> None:
+    """Changes by differences of forces: each error is made on its own, and the contacts closed."""
+    system, z, pairs = middle(name, segment)
+    best = tolerant(system, z, pairs, joint)
+    torque = float(torque_of(system, z[1:2], pairs, best.forces[0])[joint])
+    free = [0, 1, 2, 3 + joint]
+
+    def solved(
+        gap: FloatArray | float = 0.0,
+        held: float = 0.0,
+        change: FloatArray | float = 0.0,
+        load: float = 1.0,
+        more: float = 0.0,
+    ) -> FloatArray:
+        at = z[1].copy()
+        at[4 - joint] += held
+        for _ in range(8):
+            placed = system.place(at[None])
+            gradients = gap_gradients(system, placed, pairs)[0]
+            apart = gaps(system, placed, pairs).gap[0] + gap
+            at[free] -= np.linalg.solve(gradients[:, free], apart)
+        gradients = gradients + change
+        matrix = np.vstack([gradients[:, :3].T, -gradients[:, 3 + joint]])
+        return np.linalg.solve(matrix, np.append(-load * system.load, torque + more))
+
+    errors, step = disturbance(system, z, pairs), 1e-5
+    forces = solved()
+    disturbed = [solved(load=1.0 + MASS * step), solved(more=TORQUE * step)]
+    disturbed += [solved(held=JOINT * step)]
+    for unit in step * np.eye(4):
+        disturbed += [solved(gap=2.0 * GEOMETRY * unit)]
+        disturbed += [solved(change=unit[:, None] * errors.turned[1])]
+        disturbed += [solved(change=unit[:, None] * errors.shifted[1])]
+    by_friction = solved(change=step * errors.leaning[1]) - forces
+    error = np.abs(np.array(disturbed) - forces).sum(axis=0) - np.minimum(by_friction, 0.0)
+    expected = float((forces * step / error).min())
+    assert float(best.tolerance[0]) == pytest.approx(expected, rel=2e-3)
+
+
 def test_forces_balance_the_load_within_cap_and_efforts() -> None:
     system, z, pairs = middle('h045', 2)
     gradients = gap_gradients(system, system.place(z), pairs)
@@ -147,7 +196,20 @@ def test_a_torque_that_tells_nothing_tolerates_nothing() -> None:
     errors = disturbance(system, z, pairs)
     found = most_tolerant(gradients, errors, 1, system.load, limits, np.full(3, 5.0))
     np.testing.assert_array_equal(found.tolerance, 0.0)
-    assert math.isfinite(float(np.abs(found.forces).max()))
+    assert np.isnan(found.forces).all()
+
+
+def test_a_contact_that_never_presses_tolerates_nothing() -> None:
+    """Without weight and errors: two tips press a block between them, its feet nothing."""
+    gradients = np.zeros((1, 4, 5))
+    gradients[0, :, :3] = [[0, 1, -0.5], [0, 1, 0.5], [1, 0, -0.3], [-1, 0, 0.3]]
+    gradients[0, [2, 3], [3, 4]] = -0.3, -0.3
+    nothing = np.zeros_like(gradients)
+    errors = Disturbance(nothing, nothing, np.zeros((1, 4, 5, 5)), nothing)
+    with np.errstate(all='raise'):
+        found = most_tolerant(gradients, errors, 1, np.zeros(3), NO_LIMITS, np.full(1, 5.0))
+    np.testing.assert_allclose(found.forces[0, :2], 0.0, atol=1e-12)
+    np.testing.assert_allclose(found.tolerance, 0.0, atol=1e-6)
 
 
 def test_of_nearly_as_tolerant_torques_the_gentlest_is_taken() -> None:
