@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
-from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import is_flat, signed_area
+from cfplan_core.option_checks import (
+    is_above_zero,
+    is_finite,
+    is_names,
+    is_number,
+    is_pair,
+    is_sequence_of,
+    is_whole,
+    require,
+)
 
 RESOLUTION = 0.05
 """Spacing of the grid of joint angles that regions are filled over unless asked otherwise, rad."""
@@ -56,16 +64,13 @@ class TrajectoryOptions:
     event_speed: float = 0.25
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.inertia) and self.inertia > 0.0):
-            raise CfplanError(f'inertia: got {self.inertia}, expected a share above zero')
-        if not (math.isfinite(self.event_distance) and self.event_distance >= 0.0):
-            raise CfplanError(
-                f'event_distance: got {self.event_distance}, expected rad, not negative'
-            )
-        if not 0.0 < self.event_speed <= 1.0:
-            raise CfplanError(f'event_speed: got {self.event_speed}, expected above 0, at most 1')
-        if not (math.isfinite(self.squeeze) and self.squeeze > 0.0):
-            raise CfplanError(f'squeeze: got {self.squeeze}, expected weights above zero')
+        require(is_above_zero(self.inertia), 'inertia', self.inertia, 'a share above zero')
+        distance, speed = self.event_distance, self.event_speed
+        slow = is_finite(distance) and distance >= 0.0
+        require(slow, 'event_distance', distance, 'rad, not negative')
+        share = is_number(speed) and 0.0 < speed <= 1.0
+        require(share, 'event_speed', speed, 'above 0, at most 1')
+        require(is_above_zero(self.squeeze), 'squeeze', self.squeeze, 'weights above zero')
 
 
 @dataclass(frozen=True)
@@ -119,56 +124,54 @@ class PlanOptions:
         return chosen or self.alternatives > 1 or bool(self.required)
 
     def __post_init__(self) -> None:
-        if self.time_budget is not None and not self.time_budget > 0.0:
-            raise CfplanError(f'time_budget: got {self.time_budget}, expected seconds above zero')
-        if self.max_nodes is not None and not self.max_nodes > 0:
-            raise CfplanError(f'max_nodes: got {self.max_nodes}, expected a number above zero')
-        if not 1e-3 <= self.resolution <= 1.0:
-            raise CfplanError(f'resolution: got {self.resolution}, expected 0.001 to 1 rad')
-        force = self.max_needed_force
-        if force is not None and not (math.isfinite(force) and force > 0.0):
-            raise CfplanError(f'max_needed_force: got {force}, expected weights above zero')
-        if self.max_contacts is not None and not self.max_contacts > 0:
-            raise CfplanError(
-                f'max_contacts: got {self.max_contacts}, expected a number above zero'
-            )
-        if not self.alternatives > 0:
-            raise CfplanError(
-                f'alternatives: got {self.alternatives}, expected a number above zero'
-            )
-        if not 0 <= self.seed < 2**32:
-            raise CfplanError(f'seed: got {self.seed}, expected a whole number from 0 to 2³² − 1')
+        budget, force = self.time_budget, self.max_needed_force
+        seconds = budget is None or (is_number(budget) and budget > 0.0)
+        require(seconds, 'time_budget', budget, 'seconds above zero')
+        weights = force is None or is_above_zero(force)
+        require(weights, 'max_needed_force', force, 'weights above zero')
+        for field in ('max_nodes', 'max_contacts', 'alternatives'):
+            value = getattr(self, field)
+            absent = value is None and field != 'alternatives'
+            number = absent or (is_whole(value) and value > 0)
+            require(number, field, value, 'a whole number above zero')
+        fine = is_number(self.resolution) and 1e-3 <= self.resolution <= 1.0
+        require(fine, 'resolution', self.resolution, '0.001 to 1 rad')
+        seed = is_whole(self.seed) and 0 <= self.seed < 2**32
+        require(seed, 'seed', self.seed, 'a whole number from 0 to 2³² − 1')
         for field in ('forbidden', 'required'):
-            if any(isinstance(names, str) or not names for names in getattr(self, field)):
-                raise CfplanError(
-                    f'{field}: got {getattr(self, field)!r}, expected contact formations, each a '
-                    'sequence of at least one name of a contact'
-                )
-        if isinstance(self.held_joints, str):
-            raise CfplanError(
-                f'held_joints: got {self.held_joints!r}, expected a sequence of names of joints'
+            value = getattr(self, field)
+            require(
+                is_sequence_of(lambda names: bool(names) and is_names(names), value),
+                field,
+                value,
+                'contact formations, each a sequence of at least one name of a contact',
             )
-        try:
-            object.__setattr__(self, 'prefer', Preference(self.prefer))
-        except ValueError:
-            choices = ', '.join(choice.value for choice in Preference)
-            raise CfplanError(f'prefer: got {self.prefer!r}, expected one of {choices}') from None
+        held = self.held_joints
+        require(is_names(held), 'held_joints', held, 'a sequence of names of joints')
+        second_order = isinstance(self.second_order, bool)
+        require(second_order, 'second_order', self.second_order, 'True or False')
+        timing = isinstance(self.trajectory, TrajectoryOptions)
+        require(timing, 'trajectory', self.trajectory, 'TrajectoryOptions')
+        choices = [choice.value for choice in Preference]
+        known = isinstance(self.prefer, str) and self.prefer in choices
+        require(known, 'prefer', self.prefer, f'one of {", ".join(choices)}')
+        object.__setattr__(self, 'prefer', Preference(self.prefer))
         if self.stay_within is not None:
             _refuse_no_region(self.stay_within)
 
 
 def _refuse_no_region(corners: tuple[tuple[float, float], ...]) -> None:
     """Refuse what is not a convex polygon, counter-clockwise."""
-    expected = 'expected at least three corners (x, y) of a convex polygon, counter-clockwise'
-    if len(corners) < 3 or any(len(corner) != 2 for corner in corners):
-        raise CfplanError(f'stay_within: got {corners!r}, {expected}')
+    expected = 'at least three corners (x, y) of a convex polygon, counter-clockwise'
+    pairs = is_sequence_of(is_pair, corners) and len(corners) >= 3
+    require(pairs, 'stay_within', corners, expected)
     polygon = np.array(corners, dtype=float)
-    if not np.isfinite(polygon).all() or is_flat(polygon) or not signed_area(polygon) > 0.0:
-        raise CfplanError(f'stay_within: got {corners!r}, {expected}')
+    area = not is_flat(polygon) and signed_area(polygon) > 0.0
+    require(area, 'stay_within', corners, expected)
     edges = np.roll(polygon, -1, axis=0) - polygon
     after = np.roll(edges, -1, axis=0)
     turns = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
     # A star's turns are all to the left as well, but they add up to more than one.
     angles = np.arctan2(turns, (edges * after).sum(axis=1))
-    if (turns < 0.0).any() or angles.sum() > 2.0 * np.pi + 1e-6:
-        raise CfplanError(f'stay_within: got {corners!r}, {expected}')
+    convex = bool((turns >= 0.0).all()) and angles.sum() <= 2.0 * np.pi + 1e-6
+    require(convex, 'stay_within', corners, expected)

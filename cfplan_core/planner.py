@@ -168,13 +168,15 @@ class _Planning:
                     self.roadmap = on_sheets
                     legs = self._search_goals(start, goals)
         except BudgetExhaustedError as stop:
-            message = f'{stop}; {verdicts.explored(self.roadmap)}'
+            message = f'{stop}{verdicts.constrained(self.options)}; '
+            message += verdicts.explored(self.roadmap)
             if isinstance(self.search, SampledSearch):
                 message += verdicts.sampled(self.options, self.search)
             return self._answer(Status.BUDGET_EXHAUSTED, message)
         if legs is None:
             nearest = goals[-1].how_near() if isinstance(goals[-1], GoalTest) else ''
-            message = f'no path{nearest}; {verdicts.explored(self.roadmap)}'
+            message = f'no path{verdicts.constrained(self.options)}{nearest}; '
+            message += verdicts.explored(self.roadmap)
             message += verdicts.doubt(self.roadmap)
             if self.moving.joint_count > MOST_JOINTS:
                 message += '. Rays do not show that there is no plan'
@@ -351,7 +353,7 @@ class _Planning:
                 return None
         try:
             mesh = self._mesh(start, goal)
-            best = mesh.choose(prefer, first, self._refuse)
+            best = mesh.choose(prefer, first, self._refuse_one_by_one)
             if best is None:
                 return None
         except BudgetExhaustedError as stop:
@@ -389,6 +391,15 @@ class _Planning:
         refused |= straying_legs(self.system, whole, self.roadmap.constraints.bounds)
         self.roadmap.failures.update(refused.values())
         return list(refused)
+
+    def _refuse_one_by_one(self, legs: Sequence[Leg]) -> list[int]:
+        """As `_refuse`, of so many legs that the budget may end meanwhile."""
+        refused = []
+        for index, leg in enumerate(legs):
+            self._checkpoint()
+            if self._refuse([leg]):
+                refused.append(index)
+        return refused
 
     def _search(self, start: FloatArray, goal: FloatArray | GoalTest) -> Sequence[Leg] | None:
         """Search until a path is found that the joints' efforts can hold.
@@ -431,7 +442,7 @@ class _Planning:
         if count > MOST_JOINTS or along_rays:
             return None
         mesh = self._mesh(start, goal)
-        best = mesh.choose(Preference.FEWEST_SEGMENTS, None, self._refuse)
+        best = mesh.choose(Preference.FEWEST_SEGMENTS, None, self._refuse_one_by_one)
         if best is None:
             return None
         self.search = PathTrees(self.roadmap, best.legs)

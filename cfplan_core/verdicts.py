@@ -60,6 +60,24 @@ def best_sampled(options: PlanOptions, search: SampledSearch, stopped: str, foun
     )
 
 
+def constrained(options: PlanOptions) -> str:
+    """Name the constraints that a search was under, as the command line does; empty if none."""
+    named = []
+    if options.max_needed_force is not None:
+        named.append(f'max-needed-force {options.max_needed_force:g}')
+    if options.max_contacts is not None:
+        named.append(f'max-contacts {options.max_contacts}')
+    named += [f'forbid {",".join(names)}' for names in options.forbidden]
+    named += [f'require {",".join(names)}' for names in options.required]
+    named += [f'hold {name}' for name in options.held_joints]
+    if options.stay_within is not None:
+        corners = ' '.join(f'{x:g},{y:g}' for x, y in options.stay_within)
+        named.append(f"stay-within '{corners}'")
+    if not options.second_order:
+        named.append('no-second-order')
+    return f' under {", ".join(named)}' if named else ''
+
+
 def explored(roadmap: Roadmap) -> str:
     """Say what was searched, and why it did not lead on."""
     failures = '; '.join(f'{n} × {why}' for why, n in roadmap.failures.most_common(5))

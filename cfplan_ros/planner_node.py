@@ -40,7 +40,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from cfplan_core import Problem
+from cfplan_core import CfplanError, Problem
+from cfplan_core.trajectory.parameterization import import_toppra
 from cfplan_ros.conversions.times import seconds_of
 from cfplan_ros.diagnostics import LastPlan, PlannerState, diagnostic_array
 from cfplan_ros.parameters import Configuration, ParameterError, configure, declare
@@ -345,8 +346,10 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _run(wake: queue.SimpleQueue[BaseException | None]) -> int:
     try:
+        # The first request shall not wait for it, nor find that it is missing.
+        import_toppra()
         node = PlannerNode()
-    except (ParameterError, ParameterException) as error:
+    except (CfplanError, ParameterException) as error:
         get_logger(NAME).fatal(str(error))
         return 2
     executor = SingleThreadedExecutor()

@@ -113,6 +113,28 @@ def test_too_few_contacts_are_infeasible_and_say_so() -> None:
     result = planned('h447', PlanOptions(max_contacts=4))
     assert result.status is Status.INFEASIBLE
     assert f'as {CROWDED}: {result.statistics.failures[CROWDED]} ways' in result.message
+    assert result.message.startswith('no path under max-contacts 4; explored ')
+
+
+def test_answer_without_a_plan_names_each_constraint() -> None:
+    options = PlanOptions(
+        max_nodes=1,
+        max_needed_force=3.0,
+        max_contacts=5,
+        forbidden=(('object.v2|palm.0.e2', 'object.v3|palm.0.e2'),),
+        required=(('object.v2|right.link_2.e0',),),
+        stay_within=BOX,
+        second_order=False,
+    )
+    result = plan(problem_of('trinkle_hunter_1991'), options)
+    assert result.status is Status.BUDGET_EXHAUSTED, result.message
+    assert result.message.startswith(
+        'budget of 1 nodes exhausted under max-needed-force 3, max-contacts 5, '
+        'forbid object.v2|palm.0.e2,object.v3|palm.0.e2, require object.v2|right.link_2.e0, '
+        "stay-within '-0.1,-0.01 0.1,-0.01 0.1,0.1 -0.1,0.1', no-second-order; explored "
+    )
+    free = plan(problem_of('trinkle_hunter_1991'), PlanOptions(max_nodes=1))
+    assert free.message.startswith('budget of 1 nodes exhausted; explored ')
 
 
 def test_a_start_with_more_contacts_is_refused() -> None:

@@ -116,7 +116,7 @@ def study(
     """
     from cfplan_core.execution.scene import import_mujoco
     from cfplan_core.report.study_tables import study_tables
-    from cfplan_core.study.cluster import import_distributed
+    from cfplan_core.study.cluster import import_distributed, start_fork_server
     from cfplan_core.study.design import design_study
     from cfplan_core.study.log import StudyLog
     from cfplan_core.study.parameters import parse_variations
@@ -132,6 +132,8 @@ def study(
         varied = parse_variations(variations)
     except CfplanError as error:
         raise CfplanError(f'--vary: {error}') from None
+    if scheduler is None:
+        start_fork_server()
     problems = [examine(file).valid_problem() for file in files]
     runs = design_study(problems, varied, samples, seed)
     import_distributed()

@@ -25,6 +25,8 @@ from cfplan_core.mechanics.second_order import pair_forces, second_order_margin
 _SINGULAR = 1e-12
 _NEGATIVE = 1e-9
 _IMBALANCE = 1e-6
+# Torques that are so far outside their limits are so for a linear program's tolerance, too.
+_BEYOND = 1e-6
 
 
 @lru_cache(maxsize=128)
@@ -93,12 +95,19 @@ class FrictionlessModel:
     def holds_within(
         self, gradients: FloatArray, lower: FloatArray, upper: FloatArray
     ) -> BoolArray:
-        """Look for an equilibrium within torque limits: a vertex, else by linear programming."""
+        """Look for an equilibrium within torque limits: a vertex, else by linear programming.
+
+        Where some joint's limits exclude all torques that it can have there is none.
+        """
         w, j = gradients[..., :3], gradients[..., 3:]
         torques, feasible = self._equilibria(w, j)
         within = (torques >= lower[:, None]) & (torques <= upper[:, None])
         holds = np.asarray((feasible & within.all(axis=-1)).any(axis=1))
-        for index in np.flatnonzero(~holds):
+        if holds.all():
+            return holds
+        least, most = self.torque_limits(gradients)
+        hopeless = ((least > upper + _BEYOND) | (most < lower - _BEYOND)).any(axis=1)
+        for index in np.flatnonzero(~holds & ~hopeless):
             from scipy.optimize import linprog  # Costs half a second to import.
 
             limits = np.concatenate([upper[index], -lower[index]])

@@ -73,8 +73,10 @@ class BestOnMesh:
         self._expanded = expanded
         self.pieces, crossings = reachable(roadmap, roadmap.root(start), met)
         ends = [(self.pieces[0], start), *self._goals(start, goal)]
-        self._mesh, (self._start, *self._arrivals) = build_mesh(self.pieces, crossings, ends)
-        self._search = MeshSearch(self._mesh, self._start, self._arrivals, roadmap.constraints)
+        checkpoint = roadmap.tracer.checkpoint
+        mesh, (first, *arrivals) = build_mesh(self.pieces, crossings, ends, checkpoint)
+        self._mesh = mesh
+        self._search = MeshSearch(mesh, first, arrivals, roadmap.constraints, checkpoint)
         self._margins: MeshMargins | None = None
 
     def _goals(

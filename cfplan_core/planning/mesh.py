@@ -139,6 +139,7 @@ def build_mesh(
     pieces: Sequence[Piece],
     crossings: Sequence[Crossing],
     ends: Sequence[tuple[Piece, FloatArray]],
+    checkpoint: Callable[[], None] = lambda: None,
 ) -> tuple[Mesh, list[int]]:
     """Turn pieces into a mesh.
 
@@ -146,6 +147,7 @@ def build_mesh(
         pieces: All of them.
         crossings: From each of them to each.
         ends: Configurations on pieces, linked to them, that shall be nodes, too.
+        checkpoint: Called on the way; may raise.
 
     Returns:
         The mesh, and the nodes of the ends.
@@ -153,6 +155,7 @@ def build_mesh(
     meshing = _Meshing(pieces)
     joined: set[tuple[int, int]] = set()
     for piece, z, other in crossings:
+        checkpoint()
         first, second = meshing.node(piece, z), meshing.node(other, z)
         if first != second and (first, second) not in joined:
             joined |= {(first, second), (second, first)}

@@ -12,7 +12,7 @@ like that: see `robustness`.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from cfplan_core.options import Preference
@@ -60,6 +60,7 @@ class MeshSearch:
         start: int,
         goals: Collection[int],
         constraints: Constraints,
+        checkpoint: Callable[[], None] = lambda: None,
     ) -> None:
         """Prepare.
 
@@ -68,9 +69,11 @@ class MeshSearch:
             start: A node.
             goals: Nodes of which one is to be reached.
             constraints: Say which formations are required.
+            checkpoint: Called on the way; may raise to stop a search.
         """
         self.banned: set[Motion] = set()
         self._mesh = mesh
+        self._checkpoint = checkpoint
         self._start = start
         self._goals = frozenset(goals)
         self._passing = [
@@ -110,6 +113,7 @@ class MeshSearch:
             if state in done:
                 continue
             done.add(state)
+            self._checkpoint()
             if state.node in self._goals and state.passed == self._all_passed:
                 return self._traced(state, came)
             for other, motion in self._mesh.around[state.node]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import logging
+import multiprocessing
 import os
 import signal
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from itertools import islice
+from multiprocessing import forkserver
 from types import ModuleType
 from typing import Any
 
@@ -136,6 +139,8 @@ def _connected(
     scheduler: str | None, workers: int | None, runs: int, attempts: int
 ) -> Iterator[Any]:
     """Connect to a scheduler, or start one on this machine, with workers."""
+    if scheduler is None:
+        start_fork_server()
     distributed = import_distributed()
     # What becomes of workers is in the log of the study.
     for name in ('distributed', 'distributed.client'):
@@ -154,11 +159,38 @@ def _connected(
         yield client
 
 
-def _local_cluster(workers: int, attempts: int) -> Any:
+def start_fork_server() -> None:
+    """Start the process that workers of this machine are forked from, unless there is one.
+
+    It imports what they need: whoever has something to do before `run_study` calls this first.
+    """
+    context = multiprocessing.get_context('forkserver')
+    context.set_forkserver_preload(['cfplan_core.study.worker_imports'])
+    with _on_interrupt(signal.SIG_IGN):
+        # It leaves Ctrl-C, which it gets too, to the study, and so do those that it forks.
+        forkserver.ensure_running()
+
+
+@contextmanager
+def _on_interrupt(handler: Any) -> Iterator[None]:
+    """Have Ctrl-C do something else for a while; only the main thread can change that."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _local_cluster(workers: int, attempts: int) -> Iterator[Any]:
     import dask
 
     distributed = import_distributed()
     settings = {
+        'distributed.worker.multiprocessing-method': 'forkserver',
         'distributed.scheduler.allowed-failures': attempts - 1,
         # No run is held by a worker that is busy with another: it would share that one's fate.
         'distributed.scheduler.worker-saturation': 1.0,
@@ -166,18 +198,26 @@ def _local_cluster(workers: int, attempts: int) -> Any:
         'distributed.worker.http.routes': [],
         'distributed.worker.profile.enabled': False,
     }
-    with dask.config.set(settings), warnings.catch_warnings():
-        # The port that the scheduler would like to have may be taken; nobody needs it.
-        warnings.filterwarnings('ignore', message='Port .* is already in use')
-        return distributed.LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            host=LOOPBACK,
-            dashboard_address=None,
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        )
+    interrupts: list[int] = []
+    # The settings hold for workers that are started anew, too.
+    with dask.config.set(settings), ExitStack() as stack:
+        # A cluster that is interrupted while it starts cannot be closed.
+        with _on_interrupt(lambda *_: interrupts.append(signal.SIGINT)), warnings.catch_warnings():
+            # The port that the scheduler would like to have may be taken; nobody needs it.
+            warnings.filterwarnings('ignore', message='Port .* is already in use')
+            cluster = distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host=LOOPBACK,
+                dashboard_address=None,
+                memory_limit=0,
+                silence_logs=logging.CRITICAL,
+            )
+            stack.enter_context(cluster)
+        if interrupts:
+            raise KeyboardInterrupt
+        yield cluster
 
 
 def _deaf_to_interrupts() -> Any:

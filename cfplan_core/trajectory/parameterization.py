@@ -6,11 +6,17 @@ linear in s̈ and ṡ², and toppra finds the largest ṡ that can be sped up to
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
+from importlib import import_module
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from cfplan_core.errors import CfplanError
 from cfplan_core.geometry.polygon import FloatArray
 
 # Steps that a stretch is divided into at least.
@@ -104,7 +110,7 @@ def _profile(
     acceleration: FloatArray,
 ) -> FloatArray | None:
     """Run TOPP-RA: ṡ on the grid, shape (g,), or None."""
-    solver, limits = _toppra()
+    solver, limits = import_toppra()
     problem = solver(
         [limits(first, second, speeds, acceleration)],
         _Path(first.shape[1], grid[[0, -1]]),
@@ -122,13 +128,24 @@ class _Path(NamedTuple):
 
 
 @cache
-def _toppra() -> tuple[Any, Any]:
-    """TOPP-RA and a constraint of velocity and acceleration on a grid."""
-    # It costs most of a second to import.
-    from toppra.algorithm import TOPPRA
-    from toppra.algorithm.algorithm import ParameterizationAlgorithm
-    from toppra.constraint import LinearConstraint
-    from toppra.solverwrapper.cy_seidel_solverwrapper import seidelWrapper
+def import_toppra() -> tuple[Any, Any]:
+    """Import TOPP-RA, and with it a constraint of velocity and acceleration on a grid.
+
+    It costs a third of a second the first time; who wants to be quick later calls it early.
+
+    Raises:
+        CfplanError: It is not installed.
+    """
+    try:
+        with _drawing_put_off():
+            from toppra.algorithm import TOPPRA
+            from toppra.algorithm.algorithm import ParameterizationAlgorithm
+            from toppra.constraint import LinearConstraint
+            from toppra.solverwrapper.cy_seidel_solverwrapper import seidelWrapper
+    except ImportError as error:
+        raise CfplanError(
+            f'plans are timed by toppra: {error}; install it with pip install toppra'
+        ) from error
 
     class Solver(TOPPRA):  # type: ignore[misc]
         """With its own solver; TOPPRA's constructor looks on disk for others each time."""
@@ -160,3 +177,28 @@ def _toppra() -> tuple[Any, Any]:
             return self._parameters
 
     return Solver, Limits
+
+
+@contextmanager
+def _drawing_put_off() -> Iterator[None]:
+    """Let modules import pyplot for a quarter of a second less: it is loaded when it is used."""
+    name = 'matplotlib.pyplot'
+    if name in sys.modules:
+        yield
+        return
+    stand_in = ModuleType(name)
+
+    def put_back() -> None:
+        if sys.modules.get(name) is stand_in:
+            del sys.modules[name]
+
+    def load(wanted: str) -> object:
+        put_back()
+        return getattr(import_module(name), wanted)
+
+    vars(stand_in)['__getattr__'] = load
+    sys.modules[name] = stand_in
+    try:
+        yield
+    finally:
+        put_back()

@@ -43,8 +43,9 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
-    children = psutil.Process(process.pid).children(recursive=True)
-    return [child for child in children if 'spawn_main' in ' '.join(child.cmdline())]
+    children = psutil.Process(process.pid).children()
+    servers = [child for child in children if 'forkserver' in ' '.join(child.cmdline())]
+    return [worker for server in servers for worker in server.children()]
 
 
 def _wait_for_rows(path: Path, rows: int, process: subprocess.Popen[str]) -> None:

@@ -15,6 +15,7 @@ from cfplan_core.contact.detection import touching
 from cfplan_core.contact.system import ContactSystem
 from cfplan_core.mechanics.frictionless import FrictionlessModel
 from cfplan_core.options import Preference
+from cfplan_core.planning.budget import BudgetExhaustedError
 from cfplan_core.planning.constraints import UNCONSTRAINED
 from cfplan_core.planning.grasp_check import examine_problem
 from cfplan_core.planning.mesh import Mesh, Motion, build_mesh, reachable
@@ -88,6 +89,18 @@ def test_the_shortest_way_is_that_of_another_search() -> None:
     length = sum(motion.length for motion in way.motions)
     other = dijkstra(graph(mesh.motions), indices=start)[goal]
     assert length == pytest.approx(other, abs=1e-6)
+
+
+def test_search_and_meshing_end_when_they_have_to() -> None:
+    def stop() -> None:
+        raise BudgetExhaustedError('enough')
+
+    roadmap, mesh, start, goal = meshed()
+    with pytest.raises(BudgetExhaustedError):
+        MeshSearch(mesh, start, [goal], UNCONSTRAINED, stop).shortest()
+    pieces, crossings = reachable(roadmap, mesh.pieces[start])
+    with pytest.raises(BudgetExhaustedError):
+        build_mesh(pieces, crossings, [], stop)
 
 
 def test_fewest_segments_are_no_more_than_those_of_the_shortest_way() -> None:

@@ -29,8 +29,8 @@ def log(tmp_path: Path) -> Iterator[StudyLog]:
 
 def _workers() -> list[psutil.Process]:
     """The workers that this process has started."""
-    children = psutil.Process().children(recursive=True)
-    return [child for child in children if 'spawn_main' in ' '.join(child.cmdline())]
+    servers = [p for p in psutil.Process().children() if 'forkserver' in ' '.join(p.cmdline())]
+    return [worker for server in servers for worker in server.children()]
 
 
 def _quick(delay: float = 0.0) -> Callable[[StudyRun], Record]:

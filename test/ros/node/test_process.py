@@ -175,3 +175,17 @@ def test_little_space_left_is_a_warning(run_node: Run, client: Client) -> None:
     client.plan(story_request())
     status, _ = client.status('recorder', lambda status: 'MB left' in status.message)
     assert status.level == b'\x01'
+
+
+def test_missing_toppra_is_said_at_the_start(
+    run_node: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    absent = tmp_path / 'absent'
+    (absent / 'toppra').mkdir(parents=True)
+    (absent / 'toppra' / '__init__.py').write_text('raise ImportError("No module")\n')
+    monkeypatch.setenv('PYTHONPATH', f'{absent}{os.pathsep}{os.environ.get("PYTHONPATH", "")}')
+    process = run_node(*parameters(hand_file=STORY_FILE))
+    _, errors = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == 2
+    assert 'pip install toppra' in errors
+    assert 'Traceback' not in errors
