@@ -75,7 +75,8 @@ class RegionBound:
     def finding(self, z: FloatArray, gradients: FloatArray) -> tuple[str, str]:
         """Say how far a grasp's object is outside."""
         out = -float(self.margins(z, gradients)[0]) * self._size
-        return f'an object {out:.3g} m outside the region', 'an object inside it'
+        where = f'{out:.3g} m outside' if out > 1e-6 * self._size else 'on the border of'
+        return f'an object {where} the region', 'an object inside it that touches no side'
 
 
 class NeededForceBound:

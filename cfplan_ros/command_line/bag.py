@@ -31,6 +31,8 @@ _NS_PER_S = 10**9
 def bag(file: Path) -> int:
     """Say what the recorded run FILE holds: problem, outcome, topics and the plan.
 
+    Of a run that cfplan execute recorded it lists the topics.
+
     Exit status: 0 complete, 1 damaged, cut short or still being written (what can be read is
     printed), 2 FILE is no recording.
     """
