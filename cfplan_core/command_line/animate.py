@@ -10,6 +10,7 @@ import click
 
 from cfplan_core.command_line.console import answers
 from cfplan_core.command_line.inputs import problem_of_plan
+from cfplan_core.command_line.outputs import check_outputs
 from cfplan_core.command_line.progress import progress_bar
 from cfplan_core.errors import CfplanError
 
@@ -49,6 +50,7 @@ def animate(plan_path: Path, problem_path: Path | None, output: Path | None) -> 
         )
     problem = problem_of_plan(result, plan_path, problem_path)
     output = output if output is not None else plan_path.with_suffix('.gif')
+    check_outputs({'--output': output}, [plan_path, problem_path])
     with progress_bar() as bar:
         progress = None if bar is None else _shown_on(bar)
         write_animation(problem, result, output, progress=progress)

@@ -23,6 +23,7 @@ from cfplan_core.command_line.console import (
     print_findings,
 )
 from cfplan_core.command_line.inputs import Examined, examine
+from cfplan_core.command_line.outputs import check_outputs
 from cfplan_core.command_line.plan_options import wanted_plan
 from cfplan_core.command_line.progress import progress_bar
 from cfplan_core.command_line.trajectory_options import timed_plan, trajectory_options
@@ -99,9 +100,9 @@ def plan(
     """
     from cfplan_core.planner import PlanOptions
 
-    for directory in (json_path.parent if json_path else None, figure_directory):
-        if directory is not None:
-            directory.mkdir(parents=True, exist_ok=True)
+    if figure_directory is not None:
+        figure_directory.mkdir(parents=True, exist_ok=True)
+    check_outputs({'--json': json_path}, [file])
 
     try:
         trajectory = trajectory_options(wanted)

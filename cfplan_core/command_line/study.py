@@ -11,6 +11,7 @@ import click
 
 from cfplan_core.command_line.console import answers, complain
 from cfplan_core.command_line.inputs import examine
+from cfplan_core.command_line.outputs import check_outputs
 from cfplan_core.command_line.progress import progress_bar
 from cfplan_core.errors import CfplanError
 
@@ -124,6 +125,9 @@ def study(
 
     if figure_path is not None and figure_path.suffix.lower() not in ('.png', '.pdf', '.svg'):
         raise CfplanError(f'--figure: got {figure_path}, expected a name in .png, .pdf, .svg')
+    check_outputs(
+        {'--output': log_path, '--parquet': parquet_path, '--figure': figure_path}, files
+    )
     if scheduler is not None and workers is not None:
         raise CfplanError(
             f'--workers: got {workers} beside --scheduler, expected none: its workers are there'

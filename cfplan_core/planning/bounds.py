@@ -17,6 +17,9 @@ from cfplan_core.mechanics.contact_model import ContactModel
 OUTSIDE = 'the object would leave its region'
 NEEDED_FORCE = 'contacts would need more than the largest force'
 
+# An object that touches a side of its region, as on the palm, is inside; in object sizes.
+_BORDER = 1e-6
+
 
 class Bound(Protocol):
     """A limit on configurations."""
@@ -66,17 +69,16 @@ class RegionBound:
         self.reason = OUTSIDE
 
     def margins(self, z: FloatArray, gradients: FloatArray) -> FloatArray:
-        """Distance of the object from the nearest side, in object sizes; shape (s,)."""
+        """Distance of the object from the nearest side, a hair more, in object sizes; (s,)."""
         center = z[:, 0] + 1j * z[:, 1]
         points = center[:, None] + np.exp(1j * z[:, 2:3]) * self._outline
         inside = (self._inward * (points[..., None] - self._corners)).real
-        return np.asarray(inside.min(axis=(1, 2)))
+        return np.asarray(inside.min(axis=(1, 2)) + _BORDER)
 
     def finding(self, z: FloatArray, gradients: FloatArray) -> tuple[str, str]:
         """Say how far a grasp's object is outside."""
-        out = -float(self.margins(z, gradients)[0]) * self._size
-        where = f'{out:.3g} m outside' if out > 1e-6 * self._size else 'on the border of'
-        return f'an object {where} the region', 'an object inside it that touches no side'
+        out = (_BORDER - float(self.margins(z, gradients)[0])) * self._size
+        return f'an object {out:.3g} m outside the region', 'an object inside it'
 
 
 class NeededForceBound:

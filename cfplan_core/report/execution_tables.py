@@ -129,8 +129,14 @@ def trials_table(problem: Problem, result: PlanResult, trials: Trials) -> Group:
     ):
         quantiles = [unit * trials.quantile(values, part) for part in (0.5, 0.9, 1.0)]
         table.add_row(label, *(f'{value:.3f}' for value in quantiles))
-    losses = trials.first_losses().most_common(_MOST_LOSSES)
-    lines = [f'{times:5} × {name}, in segment {k + 1}' for (k, name), times in losses]
+    losses = sorted(trials.first_losses().items(), key=lambda entry: (-entry[1], entry[0]))
+    lines = [
+        f'{times:5} × {name}, in segment {k + 1}' for (k, name), times in losses[:_MOST_LOSSES]
+    ]
+    rest = sum(times for _, times in losses[_MOST_LOSSES:])
+    kept = success.trials - success.successes - sum(times for _, times in losses)
+    lines += [f'{rest:5} × other contacts'] if rest else []
+    lines += [f'{kept:5} × none'] if kept else []
     lost = [Text('Lost first where the object missed the goal', 'bold'), Text('\n'.join(lines))]
     return Group(
         Text(

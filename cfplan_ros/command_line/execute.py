@@ -12,6 +12,7 @@ import click
 
 from cfplan_core.command_line.console import answers
 from cfplan_core.command_line.inputs import problem_of_plan
+from cfplan_core.command_line.outputs import check_outputs
 from cfplan_core.command_line.progress import progress_bar
 from cfplan_core.errors import CfplanError
 from cfplan_ros.command_line.runtime import needs_rclpy
@@ -155,6 +156,13 @@ def execute(
     _check_suffix('--figure', figure_path, ('.png', '.pdf', '.svg'))
     _check_suffix('--animation', animation_path, ('.gif', '.mp4'))
     _check_suffix('--record', record_path, ('.mcap',))
+    check_outputs(
+        {'--figure': figure_path, '--animation': animation_path, '--record': record_path},
+        [plan_path, problem_path],
+    )
+    if record_path is not None:
+        with needs_rclpy():
+            import cfplan_ros.recording.execution_file  # noqa: F401 - it may be missing
     result = read_plan(plan_path)
     if not result.solved:
         raise CfplanError(

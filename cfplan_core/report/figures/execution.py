@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from cfplan_core.execution.execute import Execution
 from cfplan_core.geometry.polygon import FloatArray
@@ -15,7 +16,7 @@ from cfplan_core.report.figures.torque import interval_limits, torque_view
 from cfplan_core.report.style import INK, MUTED, OBJECT, SMALL_FONT_SIZE, joint_colours
 from cfplan_core.trajectory.plan_result import PlanResult
 
-PLANNED, EXECUTED = 'planned', 'executed'
+PLANNED, EXECUTED, LIMITS = 'planned', 'executed', 'torque limits'
 _USUAL = (1.0, 99.0)
 _POSE = (('x (mm)', 1e3), ('y (mm)', 1e3), ('angle (rad)', 1.0))
 
@@ -65,7 +66,7 @@ def execution_figure(problem: Problem, result: PlanResult, execution: Execution)
     for axes, label in zip(panels, names, strict=True):
         axes.set_ylabel(label, fontsize=SMALL_FONT_SIZE, color=INK)
     figure.align_ylabels(panels)
-    _legend(figure)
+    _legend(figure, panels[0].get_position().x1)
     return figure
 
 
@@ -76,14 +77,16 @@ def _compare(
     axes.plot(at, executed, color=INK, linewidth=0.9, gid=EXECUTED)
 
 
-def _legend(figure: Figure) -> None:
+def _legend(figure: Figure, right: float) -> None:
     figure.legend(
         handles=[
+            Patch(facecolor=MUTED, alpha=0.3, label=LIMITS),
             Line2D([], [], color=MUTED, linewidth=3.0, label=PLANNED),
             Line2D([], [], color=INK, linewidth=0.9, label=EXECUTED),
         ],
         loc='upper right',
-        ncols=2,
+        bbox_to_anchor=(right, 1.0),
+        ncols=3,
         frameon=False,
         fontsize=SMALL_FONT_SIZE,
         borderaxespad=0.2,
