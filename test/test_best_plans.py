@@ -67,6 +67,7 @@ class Explored:
         examined = examine_problem(self.system, model)
         assert examined.goal is not None
         self.start, self.goal = examined.start.z, examined.goal.z
+        self.margins: dict[tuple[Formation, bytes], float] = {}
         self.roadmap = Roadmap(self.system, model)
         last = self.roadmap.root(self.goal)
         states: list[tuple[Piece, np.ndarray]] = [(self.roadmap.root(self.start), self.start)]
@@ -96,7 +97,10 @@ class Explored:
         return len(states) - 1
 
     def margin(self, formation: Formation, z: np.ndarray) -> float:
-        return self.robustness.ratios(formation, z).worst
+        key = formation, z.tobytes()
+        if key not in self.margins:
+            self.margins[key] = self.robustness.ratios(formation, z).worst
+        return self.margins[key]
 
     def shortest(self, floor: float = -np.inf) -> float:
         """Length of the shortest path without motions of a smaller margin; by SciPy."""
