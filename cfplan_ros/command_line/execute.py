@@ -119,8 +119,7 @@ MISSED = 1
     'record_path',
     type=click.Path(dir_okay=False, path_type=Path),
     metavar='OUT',
-    help='Record what happened as .mcap, with the topics of a planning run; needs ROS 2, or the '
-    'folder standalone installed.',
+    help='Record what happened as .mcap, with the topics of a planning run; needs rclpy.',
 )
 def execute(
     plan_path: Path,
