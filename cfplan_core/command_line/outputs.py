@@ -8,6 +8,9 @@ from pathlib import Path
 
 from cfplan_core.errors import CfplanError
 
+PICTURES = ('.png', '.pdf', '.svg')
+"""Formats of figures."""
+
 
 def check_outputs(outputs: Mapping[str, Path | None], inputs: Sequence[Path | None]) -> None:
     """Refuse files that would overwrite an input or each other, or that nobody can write.
@@ -37,3 +40,18 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Sequence[Path | No
             raise CfplanError(f'{option}: cannot write {path}: {error}') from None
         if not os.access(path if path.exists() else place.parent, os.W_OK):
             raise CfplanError(f'{option}: cannot write {path}: permission denied')
+
+
+def check_suffix(option: str, path: Path | None, suffixes: tuple[str, ...]) -> None:
+    """Refuse a file whose name does not say a format that can be written.
+
+    Args:
+        option: Names the file.
+        path: Of it; None where the option was not given.
+        suffixes: In lower case, with their dots.
+
+    Raises:
+        CfplanError: The name ends otherwise.
+    """
+    if path is not None and path.suffix.lower() not in suffixes:
+        raise CfplanError(f'{option}: got {path}, expected a name in {", ".join(suffixes)}')

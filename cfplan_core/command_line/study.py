@@ -11,7 +11,7 @@ import click
 
 from cfplan_core.command_line.console import answers, complain
 from cfplan_core.command_line.inputs import examine
-from cfplan_core.command_line.outputs import check_outputs
+from cfplan_core.command_line.outputs import PICTURES, check_outputs, check_suffix
 from cfplan_core.command_line.progress import progress_bar
 from cfplan_core.errors import CfplanError
 
@@ -123,8 +123,7 @@ def study(
     from cfplan_core.study.parameters import parse_variations
     from cfplan_core.study.record import Verdict
 
-    if figure_path is not None and figure_path.suffix.lower() not in ('.png', '.pdf', '.svg'):
-        raise CfplanError(f'--figure: got {figure_path}, expected a name in .png, .pdf, .svg')
+    check_suffix('--figure', figure_path, PICTURES)
     check_outputs(
         {'--output': log_path, '--parquet': parquet_path, '--figure': figure_path}, files
     )

@@ -15,13 +15,11 @@ from cfplan_core.execution.perturbation import Uncertainty, World, draw
 from cfplan_core.execution.reference import Reference, build_reference
 from cfplan_core.execution.scene import build_scene
 from cfplan_core.execution.simulation import Gains, Run, simulate
+from cfplan_core.mechanics.friction_shift import DRIVE_STIFFNESS
 from cfplan_core.model import Problem
 from cfplan_core.trajectory.plan_result import PlanResult
 from cfplan_core.trajectory.torque_profile import POSITION
 
-# Stiffness of a joint held in position, in weights times sizes of the object per radian: for
-# 0.1 kg and 6 cm about 20 N·m/rad.
-_STIFFNESS = 330.0
 _DAMPING_RATIO = 1.0
 # Of joints in torque control, in stiffnesses: enough to keep a finger that has lost its contact
 # from running away.
@@ -135,7 +133,7 @@ class Executor:
         self.system = ContactSystem(problem)
         unit = self.system.force_unit * self.system.size
         joints = len(result.joint_names)
-        stiffness = options.gain if options.gain is not None else _STIFFNESS * unit
+        stiffness = options.gain if options.gain is not None else DRIVE_STIFFNESS * unit
         inertia = problem.object.mass * self.system.size**2
         damping = 2.0 * _DAMPING_RATIO * np.sqrt(stiffness * inertia)
         self.gains = Gains(

@@ -98,11 +98,7 @@ def _on_a_line(
     The centre is the middle of the interval of t, or the end of what the cap leaves that is
     nearest to it.
     """
-    torque = np.einsum('sk,skn->sn', base, arms)
-    rate = np.einsum('sk,skn->sn', along, arms)
-    slopes = np.concatenate([along, rate, -rate], axis=1)
-    rooms = np.concatenate([base, torque - limits[0], limits[1] - torque], axis=1)
-    low, high = interval(slopes, rooms)
+    low, high = held_interval(base, along, arms, limits)
     crossed = low > high
     both = np.isfinite(low) & np.isfinite(high)
     middle = np.where(both | crossed, 0.5 * (low + high), np.where(np.isinf(low), low, high))
@@ -110,6 +106,30 @@ def _on_a_line(
     low[crossed] = high[crossed] = middle[crossed]
     capped = np.clip(middle, *interval(-along, cap[:, None] - base))
     return np.asarray(base + np.clip(capped, low, high)[:, None] * along)
+
+
+def held_interval(
+    base: FloatArray,
+    along: FloatArray,
+    arms: FloatArray,
+    limits: tuple[FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray]:
+    """Find the t at which no contact pulls and no joint is too weak; forces base + t·along.
+
+    Args:
+        base: Shape (s, k).
+        along: Shape (s, k).
+        arms: Shape (s, k, n), torque of each joint per contact force.
+        limits: Lower and upper torques, each of shape (s, n).
+
+    Returns:
+        As `interval`.
+    """
+    torque = np.einsum('sk,skn->sn', base, arms)
+    rate = np.einsum('sk,skn->sn', along, arms)
+    slopes = np.concatenate([along, rate, -rate], axis=1)
+    rooms = np.concatenate([base, torque - limits[0], limits[1] - torque], axis=1)
+    return interval(slopes, rooms)
 
 
 def interval(slopes: FloatArray, rooms: FloatArray) -> tuple[FloatArray, FloatArray]:

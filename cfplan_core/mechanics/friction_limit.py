@@ -12,13 +12,10 @@ opens. Unlike other measures of a grasp this one depends on the direction of the
 
 from __future__ import annotations
 
-from functools import lru_cache
-from itertools import combinations
-
 import numpy as np
 
-from cfplan_core.contact.system import IntArray
 from cfplan_core.geometry.polygon import FloatArray
+from cfplan_core.mechanics.bases import cross, dot, subsets
 
 # Friction is looked at in so many steps, linear between.
 _STEPS = 4
@@ -66,17 +63,12 @@ def _room(wrenches: FloatArray, load: FloatArray) -> FloatArray:
         Shape (s,): of the three contacts that hold it best the least share of the forces; at least
         -1.
     """
-    triples = _triples(wrenches.shape[1])
+    triples = subsets(wrenches.shape[1], 3)
     a, b, c = (wrenches[:, triples[:, k]] for k in range(3))
-    sides = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
-    determinant = (a * sides[:, :, 0]).sum(axis=-1)
+    sides = np.stack([cross(b, c), cross(c, a), cross(a, b)], axis=2)
+    determinant = dot(a, sides[:, :, 0])
     forces = -(sides @ load) * np.sign(determinant)[..., None]
     total = np.abs(forces).sum(axis=-1)
     regular = np.abs(determinant) > _SINGULAR
     shares = forces.min(axis=-1) / np.where(regular & (total > 0.0), total, 1.0)
     return np.asarray(np.where(regular, shares, -1.0).max(axis=1))
-
-
-@lru_cache(maxsize=64)
-def _triples(count: int) -> IntArray:
-    return np.array(list(combinations(range(count), 3)), dtype=np.intp)

@@ -8,15 +8,14 @@ programs are solved by enumerating bases, all configurations at once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
-from itertools import combinations
 
 import numpy as np
 
-from cfplan_core.contact.system import BoolArray, IntArray
+from cfplan_core.contact.system import BoolArray
 from cfplan_core.errors import JammedError
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.actuation import actuations
+from cfplan_core.mechanics.bases import cross, dot, subsets
 from cfplan_core.mechanics.closure import span_margin, span_margins
 from cfplan_core.mechanics.contact_model import Actuation, Holding, Margins, Motion
 from cfplan_core.mechanics.needed_force import needed_forces
@@ -27,26 +26,6 @@ _NEGATIVE = 1e-9
 _IMBALANCE = 1e-6
 # Torques that are so far outside their limits are so for a linear program's tolerance, too.
 _BEYOND = 1e-6
-
-
-@lru_cache(maxsize=128)
-def _subsets(count: int, size: int) -> IntArray:
-    return np.array(list(combinations(range(count), size)), dtype=np.intp).reshape(-1, size)
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.stack(
-        [
-            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
-            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
-            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
-        ],
-        axis=-1,
-    )
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray((a * b).sum(axis=-1))
 
 
 class FrictionlessModel:
@@ -147,10 +126,10 @@ class FrictionlessModel:
             scale = 1.0 + np.abs(pressing).max(axis=1)
             holds = (rest <= _IMBALANCE * scale) & (pressing.min(axis=1) >= -_NEGATIVE * scale)
             return -np.einsum('sc,scn->sn', pressing, j)[:, None], holds[:, None]
-        triples = _subsets(w.shape[1], 3)
+        triples = subsets(w.shape[1], 3)
         a, b, c = (w[:, triples[:, i]] for i in range(3))
-        bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)
-        determinant = _dot(a, bc)
+        bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
+        determinant = dot(a, bc)
         regular = np.abs(determinant) > _SINGULAR
         safe = np.where(regular, determinant, 1.0)
         forces = -np.stack([bc @ self.load, ca @ self.load, ab @ self.load], axis=-1)
@@ -164,13 +143,13 @@ class FrictionlessModel:
         w: FloatArray, j: FloatArray, lower: FloatArray, upper: FloatArray
     ) -> None:
         """Replace limits by infinity along the rays of {c ≥ 0, W c = 0}."""
-        quadruples = _subsets(w.shape[1], 4)
+        quadruples = subsets(w.shape[1], 4)
         if not len(quadruples):
             return
         a, b, c, d = (w[:, quadruples[:, i]] for i in range(4))
-        bc, cd = _cross(b, c), _cross(c, d)
-        ad = _cross(a, d)
-        internal = np.stack([_dot(b, cd), -_dot(a, cd), -_dot(ad, b), -_dot(a, bc)], axis=-1)
+        bc, cd = cross(b, c), cross(c, d)
+        ad = cross(a, d)
+        internal = np.stack([dot(b, cd), -dot(a, cd), -dot(ad, b), -dot(a, bc)], axis=-1)
         size = np.abs(internal).max(axis=-1, keepdims=True)
         internal = internal / np.maximum(size, _SINGULAR)
         internal = internal * np.where(internal.sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
@@ -187,10 +166,10 @@ class FrictionlessModel:
                 to have a vertex.
         """
         w, drive = gradients[:, :3], gradients[:, 3:] @ joint_velocity
-        triples = _subsets(len(w), 3)
+        triples = subsets(len(w), 3)
         a, b, c = (w[triples[:, i]] for i in range(3))
-        bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)
-        determinant = _dot(a, bc)
+        bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
+        determinant = dot(a, bc)
         regular = np.abs(determinant) > _SINGULAR
         if not regular.any():
             raise JammedError(

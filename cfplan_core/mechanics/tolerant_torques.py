@@ -29,7 +29,7 @@ import numpy as np
 
 from cfplan_core.contact.disturbance import GEOMETRY, JOINT, MASS, TORQUE, Disturbance
 from cfplan_core.geometry.polygon import FloatArray
-from cfplan_core.mechanics.central_forces import interval
+from cfplan_core.mechanics.central_forces import held_interval, interval
 
 _SINGULAR = 1e-9
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
@@ -151,11 +151,7 @@ def _bounds(
     cap: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Torques at which no contact pulls, no joint is too weak and no force beyond the cap."""
-    torque = np.einsum('sk,skn->sn', base, arms)
-    rate = np.einsum('sk,skn->sn', slope, arms)
-    slopes = np.concatenate([slope, rate, -rate], axis=1)
-    rooms = np.concatenate([base, torque - limits[0], limits[1] - torque], axis=1)
-    low, high = interval(slopes, rooms)
+    low, high = held_interval(base, slope, arms, limits)
     crossed = low > high
     low[crossed] = high[crossed] = 0.5 * (low + high)[crossed]
     ends = interval(-slope, cap[:, None] - base)

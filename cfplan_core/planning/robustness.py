@@ -33,15 +33,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cfplan_core.contact.curvature import gap_hessians, wrench_rates
+from cfplan_core.contact.curvature import gap_hessians
 from cfplan_core.contact.formation import Formation
 from cfplan_core.contact.gaps import gap_gradients, offset_gradients
-from cfplan_core.contact.system import ContactSystem, Placement
+from cfplan_core.contact.system import ContactSystem
 from cfplan_core.geometry.polygon import FloatArray
 from cfplan_core.mechanics.contact_forces import least_forces
 from cfplan_core.mechanics.contact_model import ContactModel
 from cfplan_core.mechanics.friction_limit import friction_limits
-from cfplan_core.mechanics.friction_shift import friction_shifts
+from cfplan_core.mechanics.friction_shift import DRIVE_STIFFNESS, friction_shifts
 from cfplan_core.mechanics.second_order import pair_forces, unbalanced_margin
 from cfplan_core.planning.equations import is_second_order
 from cfplan_core.planning.near_misses import near_misses
@@ -55,9 +55,8 @@ _COMFORTABLE_TORQUE = 0.2
 _COMFORTABLE_LIMIT = 0.1
 _COMFORTABLE_SHIFT = 0.01
 _COMFORTABLE_FRICTION = 0.2
-# What the shift is measured with: the stiffness is that of drives in `cfplan execute`.
+# What the shift is measured with.
 _FRICTION = 0.1
-_DRIVE_STIFFNESS = 330.0
 # Step, in radians and object sizes, at which margins are looked at.
 _FINE = 0.01
 
@@ -77,6 +76,16 @@ class Ratios(NamedTuple):
     def worst(self) -> float:
         """The smallest of all: the margin of the stretch."""
         return float(min(ratio.min() for ratio in self))
+
+
+class _Held(NamedTuple):
+    """A stretch with what all ratios ask of its contacts."""
+
+    formation: Formation
+    z: FloatArray
+    gradients: FloatArray
+    slides: FloatArray
+    hessians: FloatArray
 
 
 class Robustness:
@@ -100,10 +109,10 @@ class Robustness:
             formation: The contacts that are kept.
             z: Shape (s, 3 + n), in order.
         """
-        placed, gradients = self._placed(formation, z)
-        settled = self._settled(formation, placed, gradients)
-        _, friction = self._friction(formation, placed, gradients, settled, steps_along(z))
-        steady = self._steady(formation, z, placed, gradients, settled)
+        held = self._held(formation, z)
+        settled = self._settled(held)
+        _, friction = self._friction(held, settled, steps_along(z))
+        steady = self._steady(held, settled)
         return Ratios(*steady, friction=friction, clearance=self._clearance([z]))
 
     def widths(self, formation: Formation, z: FloatArray, steps: FloatArray) -> FloatArray:
@@ -117,10 +126,10 @@ class Robustness:
         Returns:
             Shape (2, s): of the motion backwards and as it is.
         """
-        placed, gradients = self._placed(formation, z)
-        settled = self._settled(formation, placed, gradients)
-        steady = np.minimum.reduce(self._steady(formation, z, placed, gradients, settled))
-        friction = self._friction(formation, placed, gradients, settled, steps)
+        held = self._held(formation, z)
+        settled = self._settled(held)
+        steady = np.minimum.reduce(self._steady(held, settled))
+        friction = self._friction(held, settled, steps)
         return np.minimum(steady, friction)
 
     def width(self, formation: Formation, z: FloatArray) -> float:
@@ -141,21 +150,24 @@ class Robustness:
         width = min(self.width(formation, z) for formation, z in legs)
         return min(width, float(self._clearance([z for _, z in legs]).min()))
 
-    def _placed(self, formation: Formation, z: FloatArray) -> tuple[Placement, FloatArray]:
-        """Where everything is, and the gradients of the contacts' gaps."""
-        placed = self.system.place(z)
-        return placed, gap_gradients(self.system, placed, formation.array)
+    def _held(self, formation: Formation, z: FloatArray) -> _Held:
+        """Differentiate the contacts of a stretch."""
+        system, pairs = self.system, formation.array
+        placed = system.place(z)
+        return _Held(
+            formation,
+            z,
+            gap_gradients(system, placed, pairs),
+            offset_gradients(system, placed, pairs),
+            gap_hessians(system, placed, pairs),
+        )
 
     def _steady(
-        self,
-        formation: Formation,
-        z: FloatArray,
-        placed: Placement,
-        gradients: FloatArray,
-        settled: FloatArray,
+        self, held: _Held, settled: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """Ratios of force, hold, torque, limits and stiffness, each of shape (s,)."""
         system, model = self.system, self._model
+        formation, z, gradients = held[:3]
         joints = z[:, 3:]
         room = np.minimum(joints - system.lower, system.upper - joints).min(axis=1)
         hold = stability_margins(system, model, z, gradients, formation.array).stable
@@ -165,23 +177,18 @@ class Robustness:
             np.maximum(np.maximum(hold, 0.0) / firm, settled / _COMFORTABLE_HOLD),
             self._torque(gradients, z) / _COMFORTABLE_TORQUE,
             room / _COMFORTABLE_LIMIT,
-            _COMFORTABLE_SHIFT / np.maximum(self._shift(formation, placed, gradients), 1e-9),
+            _COMFORTABLE_SHIFT / np.maximum(self._shift(held), 1e-9),
         )
 
-    def _friction(
-        self,
-        formation: Formation,
-        placed: Placement,
-        gradients: FloatArray,
-        settled: FloatArray,
-        steps: FloatArray,
-    ) -> FloatArray:
+    def _friction(self, held: _Held, settled: FloatArray, steps: FloatArray) -> FloatArray:
         """Ratio of friction in motions backwards and as they are; shape (2, s)."""
-        if is_second_order(formation.pairs):
+        if is_second_order(held.formation.pairs):
             return np.full((2, len(steps)), np.inf)
-        slides = offset_gradients(self.system, placed, formation.array)
         load, most = self.system.load, _COMFORTABLE_FRICTION
-        limits = [friction_limits(gradients, slides, way, load, most) for way in (-steps, steps)]
+        limits = [
+            friction_limits(held.gradients, held.slides, way, load, most)
+            for way in (-steps, steps)
+        ]
         return np.maximum(np.array(limits) / most, settled / _COMFORTABLE_HOLD)
 
     def _clearance(self, parts: Sequence[FloatArray]) -> FloatArray:
@@ -196,39 +203,31 @@ class Robustness:
         forces, _ = pair_forces(gradients[..., :3], self.system.load)
         return np.asarray(forces.max(axis=1))
 
-    def _settled(
-        self, formation: Formation, placed: Placement, gradients: FloatArray
-    ) -> FloatArray:
+    def _settled(self, held: _Held) -> FloatArray:
         """Stability margin of two of the contacts at best, less what they leave to the others.
 
         That of two contacts is there also where these only nearly balance the object; shape (s,).
         """
-        system, pairs = self.system, formation.array
-        found = np.full(len(gradients), -np.inf)
+        load = self.system.load
+        found = np.full(len(held.z), -np.inf)
         if not self._model.second_order:
             return found
-        for chosen in combinations(range(len(pairs)), 2):
+        for chosen in combinations(range(len(held.formation)), 2):
             two = list(chosen)
-            rates = wrench_rates(system, placed, pairs[two])
-            wrenches = gradients[:, two, :3]
-            _, rest = pair_forces(wrenches, system.load)
-            found = np.maximum(found, unbalanced_margin(wrenches, rates, system.load) - rest)
+            wrenches, rates = held.gradients[:, two, :3], held.hessians[:, two, :3]
+            _, rest = pair_forces(wrenches, load)
+            found = np.maximum(found, unbalanced_margin(wrenches, rates, load) - rest)
         return found
 
-    def _shift(self, formation: Formation, placed: Placement, gradients: FloatArray) -> FloatArray:
+    def _shift(self, held: _Held) -> FloatArray:
         """Largest shift of the object by friction; shape (s,)."""
-        system, pairs = self.system, formation.array
-        wrenches = gradients[..., :3]
-        if is_second_order(pairs):
-            forces, _ = pair_forces(wrenches, system.load)
+        wrenches, load = held.gradients[..., :3], self.system.load
+        if is_second_order(held.formation.pairs):
+            forces, _ = pair_forces(wrenches, load)
         else:
-            forces = least_forces(wrenches, system.load)
+            forces = least_forces(wrenches, load)
         shifts = friction_shifts(
-            gradients,
-            offset_gradients(system, placed, pairs),
-            gap_hessians(system, placed, pairs),
-            np.nan_to_num(forces),
-            _DRIVE_STIFFNESS,
+            held.gradients, held.slides, held.hessians, np.nan_to_num(forces), DRIVE_STIFFNESS
         )
         return np.where(np.isnan(forces).any(axis=1), np.inf, _FRICTION * shifts)
 

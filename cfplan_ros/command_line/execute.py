@@ -12,7 +12,7 @@ import click
 
 from cfplan_core.command_line.console import answers
 from cfplan_core.command_line.inputs import problem_of_plan
-from cfplan_core.command_line.outputs import check_outputs
+from cfplan_core.command_line.outputs import PICTURES, check_outputs, check_suffix
 from cfplan_core.command_line.progress import progress_bar
 from cfplan_core.errors import CfplanError
 from cfplan_ros.command_line.runtime import needs_rclpy
@@ -152,9 +152,9 @@ def execute(
     from cfplan_core.report.execution_tables import execution_table, trials_table
     from cfplan_core.trajectory.plan_file import read_plan
 
-    _check_suffix('--figure', figure_path, ('.png', '.pdf', '.svg'))
-    _check_suffix('--animation', animation_path, ('.gif', '.mp4'))
-    _check_suffix('--record', record_path, ('.mcap',))
+    check_suffix('--figure', figure_path, PICTURES)
+    check_suffix('--animation', animation_path, ('.gif', '.mp4'))
+    check_suffix('--record', record_path, ('.mcap',))
     check_outputs(
         {'--figure': figure_path, '--animation': animation_path, '--record': record_path},
         [plan_path, problem_path],
@@ -183,11 +183,6 @@ def execute(
         succeeded = outcomes.success.successes == trials
     _write(problem, result, execution, began, figure_path, animation_path, record_path)
     return 0 if succeeded else MISSED
-
-
-def _check_suffix(option: str, path: Path | None, suffixes: tuple[str, ...]) -> None:
-    if path is not None and path.suffix.lower() not in suffixes:
-        raise CfplanError(f'{option}: got {path}, expected a name in {", ".join(suffixes)}')
 
 
 def _run_trials(executor: Executor, count: int) -> Trials:
